@@ -1,0 +1,28 @@
+# Each target makes its own virtual environment; nothing else is needed but Python 3.11 or later.
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+
+.PHONY: test lint demo clean
+.DELETE_ON_ERROR:
+
+$(VENV)/ready: pyproject.toml
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --editable ".[test,lint]"
+	touch $@
+
+test: $(VENV)/ready
+	$(BIN)/python -m pytest -n 2 --dist loadfile
+
+lint: $(VENV)/ready
+	$(BIN)/ruff format --check .
+	$(BIN)/ruff check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+# The main job on built-in data: four detectors on two simulated approaches, a table, and a run folder to look into.
+demo: $(VENV)/ready
+	$(BIN)/uwbbench run configs/experiments/demo.yaml --out demo
+
+clean:
+	rm -rf $(VENV) demo build dist

@@ -1,0 +1,1 @@
+"""The dataset adapters of uwbbench, one module a format."""

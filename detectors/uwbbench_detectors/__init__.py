@@ -1,0 +1,1 @@
+"""The built-in stages of uwbbench, one module a family."""

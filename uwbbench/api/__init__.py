@@ -1,0 +1,103 @@
+"""All that a plugin author may import.
+
+Names load on first use, so that listing plugins or printing a help text does not import numpy.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from uwbbench.api.arrays import BoolArray, ComplexArray, FloatArray, IntArray
+    from uwbbench.api.block import Block
+    from uwbbench.api.capture import Capture, CaptureHeader, Samples, analytic
+    from uwbbench.api.capture_file import open_capture, write_capture
+    from uwbbench.api.dataset import Card, Dataset, DatasetFile
+    from uwbbench.api.detections import COLUMNS, Detections
+    from uwbbench.api.errors import (
+        CaptureError,
+        ConfigError,
+        PluginError,
+        ScoringError,
+        StoreError,
+        UwbbenchError,
+        nearest,
+    )
+    from uwbbench.api.frames import Frames, magnitude
+    from uwbbench.api.geometry import SPEED_OF_LIGHT_M_S
+    from uwbbench.api.metric import Metric, Outcome
+    from uwbbench.api.radar import Radar
+    from uwbbench.api.stage import Filter, Params, Stage, ports
+    from uwbbench.api.truth import Obstacle, Sight, Trajectory, Truth
+
+_HOME = {
+    "arrays": ("BoolArray", "ComplexArray", "FloatArray", "IntArray"),
+    "block": ("Block",),
+    "capture": ("Capture", "CaptureHeader", "Samples", "analytic"),
+    "capture_file": ("open_capture", "write_capture"),
+    "dataset": ("Card", "Dataset", "DatasetFile"),
+    "detections": ("COLUMNS", "Detections"),
+    "errors": (
+        "CaptureError",
+        "ConfigError",
+        "PluginError",
+        "ScoringError",
+        "StoreError",
+        "UwbbenchError",
+        "nearest",
+    ),
+    "frames": ("Frames", "magnitude"),
+    "geometry": ("SPEED_OF_LIGHT_M_S",),
+    "metric": ("Metric", "Outcome"),
+    "radar": ("Radar",),
+    "stage": ("Filter", "Params", "Stage", "ports"),
+    "truth": ("Obstacle", "Sight", "Trajectory", "Truth"),
+}
+_MODULE_OF = {name: module for module, names in _HOME.items() for name in names}
+
+__all__ = [
+    "COLUMNS",
+    "SPEED_OF_LIGHT_M_S",
+    "Block",
+    "BoolArray",
+    "Capture",
+    "CaptureError",
+    "CaptureHeader",
+    "Card",
+    "ComplexArray",
+    "ConfigError",
+    "Dataset",
+    "DatasetFile",
+    "Detections",
+    "Filter",
+    "FloatArray",
+    "Frames",
+    "IntArray",
+    "Metric",
+    "Obstacle",
+    "Outcome",
+    "Params",
+    "PluginError",
+    "Radar",
+    "Samples",
+    "ScoringError",
+    "Sight",
+    "Stage",
+    "StoreError",
+    "Trajectory",
+    "Truth",
+    "UwbbenchError",
+    "analytic",
+    "magnitude",
+    "nearest",
+    "open_capture",
+    "ports",
+    "write_capture",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _MODULE_OF:
+        raise AttributeError(f"module 'uwbbench.api' has no attribute '{name}'")
+    return getattr(importlib.import_module(f"uwbbench.api.{_MODULE_OF[name]}"), name)

@@ -1,0 +1,92 @@
+"""What travels along the chain of stages: frames, and all that was computed about them so far."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from uwbbench.api.arrays import FloatArray, IntArray
+from uwbbench.api.detections import Detections
+from uwbbench.api.errors import PluginError
+from uwbbench.api.frames import Frames
+
+
+@dataclass(frozen=True)
+class Block:
+    """Frames and what the stages so far have made of them.
+
+    A stage returns a new block with the parts that it produces. Arrays are shared, never changed in place.
+
+    Attributes
+    ----------
+    frames : Frames
+    first_path : (frames,) array or None
+        Fractional tap at which the delay is zero. Port ``first_path``.
+    noise_rms : (frames,) array or None
+        Root mean square of the noise, in the units of the raw samples. Port ``noise``.
+    profile : (frames, taps - profile_start) array or None
+        The real-valued curve that detectors search. Port ``profile``.
+    profile_start : int
+        Tap of the first column of ``profile``.
+    detections : Detections
+        Rows so far; may hold rows of earlier frames behind a stage that delays them. Port ``detections``.
+    """
+
+    frames: Frames
+    first_path: FloatArray | None = None
+    noise_rms: FloatArray | None = None
+    profile: FloatArray | None = None
+    profile_start: int = 0
+    detections: Detections = field(default_factory=Detections.empty)
+
+    def replace(self, **parts: Any) -> Block:
+        """Block with some parts replaced."""
+        return dataclasses.replace(self, **parts)
+
+    def with_columns(self, **columns: Any) -> Block:
+        """Block whose detections carry more columns."""
+        return self.replace(detections=self.detections.with_columns(**columns))
+
+    @property
+    def rows(self) -> IntArray:
+        """Row of this block's frames that each detection belongs to (n,)."""
+        return self.detections.frame - self.frames.first
+
+    def part(self, name: str) -> FloatArray:
+        """``first_path``, ``noise_rms`` or ``profile``, known to be there.
+
+        Raises
+        ------
+        PluginError
+            If no stage has produced it: the asking stage does not declare what it consumes.
+        """
+        value = getattr(self, name)
+        if value is None:
+            raise PluginError(
+                f"a stage uses '{name}', which no earlier stage has produced; it must declare that it consumes it"
+            )
+        return np.asarray(value)
+
+    @staticmethod
+    def join(blocks: list[Block]) -> Block:
+        """One block from consecutive ones."""
+        if len(blocks) == 1:
+            return blocks[0]
+        first = blocks[0]
+
+        def stacked(name: str) -> FloatArray | None:
+            if getattr(first, name) is None:
+                return None
+            return np.concatenate([getattr(block, name) for block in blocks])
+
+        return Block(
+            frames=Frames.join([block.frames for block in blocks]),
+            first_path=stacked("first_path"),
+            noise_rms=stacked("noise_rms"),
+            profile=stacked("profile"),
+            profile_start=first.profile_start,
+            detections=Detections.join([block.detections for block in blocks]),
+        )

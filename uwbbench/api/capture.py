@@ -1,0 +1,206 @@
+"""A capture: one run of one receiver, opened lazily."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass, field, fields
+from functools import cached_property
+from typing import Any, Literal, Protocol, runtime_checkable
+
+import numpy as np
+
+from uwbbench.api.arrays import BoolArray, ComplexArray, FloatArray
+from uwbbench.api.errors import CaptureError
+from uwbbench.api.frames import Frames
+from uwbbench.api.radar import Radar
+from uwbbench.api.truth import Trajectory, Truth
+
+
+@runtime_checkable
+class Samples(Protocol):
+    """Anything sliced like a (frames, taps) array: an array, a memory map or an HDF5 dataset."""
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Frames and taps."""
+
+    def __getitem__(self, key: Any, /) -> Any:
+        """Rows as an array."""
+
+
+def analytic(real: FloatArray) -> ComplexArray:
+    """Analytic signal of real samples (frames, taps) along the taps.
+
+    Negative frequencies are set to zero and positive ones doubled, so that the magnitude is the envelope
+    (Marple, IEEE Trans. Signal Processing 47(9), 1999).
+    """
+    taps = real.shape[-1]
+    gain = np.zeros(taps)
+    gain[0] = 1.0
+    gain[1 : (taps + 1) // 2] = 2.0
+    if taps % 2 == 0:
+        gain[taps // 2] = 1.0
+    return np.asarray(np.fft.ifft(np.fft.fft(real.astype(np.float64), axis=-1) * gain, axis=-1))
+
+
+@dataclass(frozen=True, kw_only=True)
+class CaptureHeader:
+    """All of a capture but its samples: enough to score detections.
+
+    Attributes
+    ----------
+    name : str
+    radar : Radar
+    trajectory : Trajectory
+    truth : Truth or None
+        None where there is no ground truth: the capture can be detected on, timed and plotted, not scored.
+    source : {"measured", "simulated"}
+    license, citation, description : str
+    """
+
+    name: str
+    radar: Radar
+    trajectory: Trajectory
+    truth: Truth | None = None
+    source: Literal["measured", "simulated"] = "measured"
+    license: str = "unknown"
+    citation: str = ""
+    description: str = ""
+
+    def __len__(self) -> int:
+        return len(self.trajectory)
+
+    @property
+    def duration_s(self) -> float:
+        """Time from the first to the end of the last frame."""
+        times = self.trajectory.timestamp_s
+        return float(times[-1] - times[0] + 1 / self.radar.frame_rate_hz) if len(times) else 0.0
+
+
+_PER_FRAME = (
+    "first_path_index",
+    "first_path_index_sts1",
+    "first_path_index_sts2",
+    "odometry_position_m",
+    "odometry_yaw_rad",
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Capture(CaptureHeader):
+    """One run of one receiver.
+
+    Attributes
+    ----------
+    preamble : (frames, taps) samples
+        Complex, or real where the radar stores RF; read where they lie.
+    sts1, sts2 : (frames, taps) complex samples or None
+        The responses of the two antennas; both or neither.
+    first_path_index, first_path_index_sts1, first_path_index_sts2 : (frames,) array or None
+    odometry_position_m, odometry_yaw_rad : array or None
+    receivers : tuple of str
+        All receivers in the file this capture came from.
+    """
+
+    preamble: Samples
+    sts1: Samples | None = None
+    sts2: Samples | None = None
+    first_path_index: FloatArray | None = None
+    first_path_index_sts1: FloatArray | None = None
+    first_path_index_sts2: FloatArray | None = None
+    odometry_position_m: FloatArray | None = None
+    odometry_yaw_rad: FloatArray | None = None
+    receivers: tuple[str, ...] = field(default=())
+
+    def __post_init__(self) -> None:
+        frames, taps = self.preamble.shape
+        if taps != self.radar.taps:
+            raise CaptureError(f"capture '{self.name}': frames have {taps} taps, the radar says {self.radar.taps}")
+        if (self.sts1 is None) != (self.sts2 is None):
+            raise CaptureError(f"capture '{self.name}': one STS response without the other")
+        if self.radar.has_sts != (self.sts1 is not None):
+            raise CaptureError(f"capture '{self.name}': radar.has_sts disagrees with the samples given")
+        if self.radar.has_first_path != (self.first_path_index is not None):
+            raise CaptureError(f"capture '{self.name}': radar.has_first_path disagrees with the data given")
+        counts = {"timestamp_s": len(self.trajectory.timestamp_s), "position_m": len(self.trajectory.position_m)}
+        counts["yaw_rad"] = len(self.trajectory.yaw_rad)
+        for name in ("sts1", "sts2", *_PER_FRAME):
+            value = getattr(self, name)
+            if value is not None:
+                counts[name] = value.shape[0]
+        wrong = {name: count for name, count in counts.items() if count != frames}
+        if wrong:
+            raise CaptureError(f"capture '{self.name}': preamble has {frames} frames, but {wrong}")
+        times = self.trajectory.timestamp_s
+        if len(times) and not (np.all(np.isfinite(times)) and np.all(np.diff(times) >= 0)):
+            bad = (
+                int(np.argmin(np.diff(times) >= 0)) + 1
+                if np.all(np.isfinite(times))
+                else int(np.argmin(np.isfinite(times)))
+            )
+            raise CaptureError(
+                f"capture '{self.name}': timestamp_s must be finite and not decrease; frame {bad} breaks that"
+            )
+
+    @property
+    def header(self) -> CaptureHeader:
+        """The capture without its samples."""
+        return CaptureHeader(**{item.name: getattr(self, item.name) for item in fields(CaptureHeader)})
+
+    def frames(self, start: int = 0, stop: int | None = None) -> Frames:
+        """Frames ``start`` to ``stop`` as complex samples, with the validity mark of each.
+
+        Real RF samples become their analytic signal.
+        """
+        stop = len(self) if stop is None else min(stop, len(self))
+        raw = np.asarray(self.preamble[start:stop])
+        valid: BoolArray = np.all(np.isfinite(raw), axis=1)
+        if self.radar.samples == "rf":
+            with np.errstate(invalid="ignore"):  # an infinite sample makes its whole frame NaN, which is marked invalid
+                raw = analytic(raw)
+        extra: dict[str, Any] = {}
+        for name in ("sts1", "sts2"):
+            samples = getattr(self, name)
+            if samples is not None:
+                extra[name] = np.asarray(samples[start:stop])
+                valid = valid & np.all(np.isfinite(extra[name]), axis=1)
+        for name in _PER_FRAME:
+            if getattr(self, name) is not None:
+                extra[name] = getattr(self, name)[start:stop]
+        return Frames(
+            first=start,
+            preamble=raw,
+            timestamp_s=self.trajectory.timestamp_s[start:stop],
+            position_m=self.trajectory.position_m[start:stop],
+            yaw_rad=self.trajectory.yaw_rad[start:stop],
+            valid=valid,
+            **extra,
+        )
+
+    def blocks(self, size: int) -> Iterator[Frames]:
+        """Frames in consecutive blocks of ``size``; the last may be shorter."""
+        if size < 1:
+            raise ValueError(f"a block holds at least one frame, not {size}")
+        for start in range(0, len(self), size):
+            yield self.frames(start, start + size)
+
+    @cached_property
+    def sha256(self) -> str:
+        """Hash of the content: radar, poses, truth and samples, whatever file they came from."""
+        digest = hashlib.sha256(json.dumps(self.radar.to_dict(), sort_keys=True).encode())
+        track = self.trajectory
+        arrays: list[Samples | None] = [track.timestamp_s, track.position_m, track.yaw_rad]
+        arrays += [getattr(self, name) for name in ("preamble", "sts1", "sts2", *_PER_FRAME)]
+        if self.truth is not None:
+            for thing in self.truth.objects:
+                label = [thing.name, thing.material, thing.structure, self.truth.exhaustive]
+                digest.update(json.dumps(label).encode())
+                arrays.append(thing.outline_m)
+        for array in arrays:
+            digest.update(b"-" if array is None else str(array.shape).encode())
+            for start in range(0, 0 if array is None else array.shape[0], 65536):
+                assert array is not None  # noqa: S101
+                digest.update(np.ascontiguousarray(array[start : start + 65536]).tobytes())
+        return digest.hexdigest()

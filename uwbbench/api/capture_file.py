@@ -1,0 +1,343 @@
+"""The capture file, version 1: reading it lazily and writing it whole or not at all.
+
+One HDF5 file holds one run of one radar with one or more receivers. Arrays are contiguous and uncompressed, so that
+they are read where they lie through a memory map; chunked or compressed arrays are read through HDF5. Files with
+objects that move carry version 1.1, which adds a frame axis to ``outline_m``; everything else is version 1.0.
+"""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, cast
+
+import h5py
+import numpy as np
+
+from uwbbench.api.arrays import FloatArray
+from uwbbench.api.capture import Capture, Samples
+from uwbbench.api.errors import CaptureError, nearest
+from uwbbench.api.radar import Radar
+from uwbbench.api.truth import Obstacle, Trajectory, Truth
+
+FORMAT = "uwbbench-capture"
+_REQUIRED = object()
+_RECEIVER_OPTIONAL = ("array_spacing_m", "first_tap_delay_s")
+_TRACKS = ("first_path_index", "first_path_index_sts1", "first_path_index_sts2", "odometry_yaw_rad")
+
+
+class _Reader:
+    """One open file, with errors that name the file and the path inside it."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        if not path.is_file():
+            raise CaptureError(f"{path}: no such capture file")
+        try:
+            self.file = h5py.File(path, "r")
+        except OSError as error:
+            raise CaptureError(f"{path}: not a readable HDF5 file, or truncated ({error})") from error
+
+    def fail(self, where: str, text: str) -> CaptureError:
+        return CaptureError(f"{self.path}: {where}: {text}")
+
+    def group(self, where: str) -> Any:
+        found = self._follow(where)
+        if not isinstance(found, h5py.Group):
+            raise self.fail(where, "expected a group, found nothing" if found is None else "expected a group")
+        return found
+
+    def _follow(self, where: str) -> Any:
+        """Object at a path, refusing links that leave the file."""
+        here: Any = self.file
+        for name in where.strip("/").split("/"):
+            if not name:
+                continue
+            if not isinstance(here, h5py.Group) or name not in here:
+                return None
+            if not isinstance(here.get(name, getlink=True), h5py.HardLink):
+                raise self.fail(where, "links are not followed; the data must lie in this file")
+            here = here[name]
+        return here
+
+    def attribute(self, where: str, name: str, kind: type, default: Any = _REQUIRED) -> Any:
+        attributes = self.file.attrs if where == "/" else self.group(where).attrs
+        label = f"{where.rstrip('/')}@{name}"
+        if name not in attributes:
+            if default is _REQUIRED:
+                raise self.fail(label, f"attribute missing; expected {kind.__name__}.{nearest(name, attributes)}")
+            return default
+        value = attributes[name]
+        try:
+            if kind is str:
+                return value.decode() if isinstance(value, bytes) else str(value)
+            if kind is tuple:
+                vector = tuple(float(item) for item in np.asarray(value, float).ravel())
+                if len(vector) != 3 or not np.all(np.isfinite(vector)):
+                    raise self.fail(label, f"expected 3 finite numbers, found {value!r}")
+                return vector
+            number = kind(value)
+            if kind is float and not np.isfinite(number):
+                raise self.fail(label, f"expected a finite number, found {value!r}")
+            return number
+        except (TypeError, ValueError) as error:
+            raise self.fail(label, f"expected {kind.__name__}, found {value!r}") from error
+
+    def dataset(self, where: str, *, required: bool = True) -> h5py.Dataset | None:
+        found = self._follow(where)
+        if found is None:
+            if required:
+                raise self.fail(where, "array missing")
+            return None
+        if not isinstance(found, h5py.Dataset):
+            raise self.fail(where, "expected an array, found a group")
+        if found.external or found.is_virtual:
+            raise self.fail(where, "the array lies in another file; it must lie in this one")
+        return found
+
+    def samples(self, where: str, kinds: str, shape: tuple[int, int] | None, *, required: bool) -> Samples | None:
+        """Array (frames, taps) of samples, memory-mapped where the layout allows it."""
+        found = self.dataset(where, required=required)
+        if found is None:
+            return None
+        if found.ndim != 2 or (shape is not None and found.shape != shape):
+            raise self.fail(where, f"expected shape {shape or '(frames, taps)'}, found {found.shape}")
+        if found.dtype.kind not in kinds:
+            expected = "complex64" if kinds == "c" else "float32 (radar samples are 'rf')"
+            raise self.fail(where, f"expected {expected}, found {found.dtype}")
+        offset = found.id.get_offset()
+        if found.chunks is None and offset is not None and found.size:
+            return np.memmap(self.path, dtype=found.dtype, mode="r", offset=offset, shape=found.shape)
+        return cast(Samples, found)
+
+    def track(self, where: str, shape: tuple[int, ...], *, required: bool = False) -> FloatArray | None:
+        """Per-frame values, read at once."""
+        found = self.dataset(where, required=required)
+        if found is None:
+            return None
+        if found.shape != shape:
+            raise self.fail(where, f"expected shape {shape} (as many frames as the preamble), found {found.shape}")
+        try:
+            return np.asarray(found[...], dtype=np.float64)
+        except (TypeError, ValueError, OSError) as error:
+            raise self.fail(where, f"expected float64 values: {error}") from error
+
+
+def open_capture(path: str | os.PathLike[str], receiver: str | None = None) -> Capture:
+    """Open a capture file.
+
+    Parameters
+    ----------
+    path : path
+        An ``.h5`` file in the capture format.
+    receiver : str, optional
+        Which receiver; may be left out where the file has one.
+
+    Returns
+    -------
+    Capture
+        Samples stay on disk until they are asked for.
+
+    Raises
+    ------
+    CaptureError
+        If the file breaks the format; the message names the path inside the file and what was expected.
+    """
+    reader = _Reader(Path(path))
+    kind = reader.attribute("/", "format", str)
+    if kind != FORMAT:
+        raise reader.fail("/@format", f"expected '{FORMAT}', found '{kind}'")
+    version = reader.attribute("/", "format_version", str)
+    if version.split(".")[0] != "1":
+        raise reader.fail("/@format_version", f"version {version} is not readable here; expected 1.x")
+    receivers = tuple(sorted(reader.group("/receivers")))
+    if not receivers:
+        raise reader.fail("/receivers", "expected at least one receiver")
+    if receiver is None:
+        if len(receivers) > 1:
+            raise reader.fail("/receivers", f"has several receivers, choose one of: {', '.join(receivers)}")
+        receiver = receivers[0]
+    elif receiver not in receivers:
+        raise reader.fail("/receivers", f"no receiver '{receiver}'.{nearest(receiver, receivers)}")
+    try:
+        return _read(reader, receiver, receivers)
+    except CaptureError as error:
+        text = str(error)
+        raise (error if text.startswith(str(path)) else reader.fail(f"/receivers/{receiver}", text)) from None
+
+
+def _read(reader: _Reader, receiver: str, receivers: tuple[str, ...]) -> Capture:
+    base = f"/receivers/{receiver}"
+    storage = reader.attribute("/radar", "samples", str)
+    if storage not in ("iq", "rf"):
+        raise reader.fail("/radar@samples", f"expected 'iq' or 'rf', found '{storage}'")
+    preamble = reader.samples(f"{base}/preamble", "c" if storage == "iq" else "fiu", None, required=True)
+    assert preamble is not None  # noqa: S101
+    shape = (int(preamble.shape[0]), int(preamble.shape[1]))
+    if shape[1] == 0:
+        raise reader.fail(f"{base}/preamble", f"expected at least one tap, found shape {shape}")
+    sts = [reader.samples(f"{base}/{name}", "c", shape, required=False) for name in ("sts1", "sts2")]
+    if (sts[0] is None) != (sts[1] is None):
+        present = "sts1" if sts[1] is None else "sts2"
+        raise reader.fail(f"{base}/{present}", "one STS array without the other; expected both or neither")
+    timestamp_s = reader.track(f"{base}/timestamp_s", shape[:1], required=True)
+    assert timestamp_s is not None  # noqa: S101
+    if np.any(~np.isfinite(timestamp_s)) or np.any(np.diff(timestamp_s) < 0):
+        raise reader.fail(f"{base}/timestamp_s", "expected finite times that do not decrease")
+    tracks = {name: reader.track(f"{base}/{name}", shape[:1]) for name in _TRACKS}
+    position_m = reader.track(f"{base}/position_m", (shape[0], 3))
+    yaw_rad = reader.track(f"{base}/yaw_rad", shape[:1])
+    optional = {name: reader.attribute(base, name, float, None) for name in _RECEIVER_OPTIONAL}
+    radar = Radar(
+        model=reader.attribute("/radar", "model", str),
+        **{
+            name: reader.attribute("/radar", name, float)
+            for name in ("center_frequency_hz", "bandwidth_hz", "sample_interval_s", "frame_rate_hz")
+        },
+        taps=shape[1],
+        samples="iq" if storage == "iq" else "rf",
+        channel=reader.attribute("/radar", "channel", int, None),
+        receiver=receiver,
+        mount_position_m=reader.attribute(base, "mount_position_m", tuple),
+        mount_yaw_rad=reader.attribute(base, "mount_yaw_rad", float),
+        tx_position_m=reader.attribute(base, "tx_position_m", tuple),
+        noise_taps=reader.attribute(base, "noise_taps", int),
+        **optional,
+        has_sts=sts[0] is not None,
+        has_first_path=tracks["first_path_index"] is not None,
+    )
+    source = reader.attribute("/", "source", str)
+    if source not in ("measured", "simulated"):
+        raise reader.fail("/@source", f"expected 'measured' or 'simulated', found '{source}'")
+    return Capture(
+        name=reader.attribute("/", "name", str),
+        source="measured" if source == "measured" else "simulated",
+        license=reader.attribute("/", "license", str),
+        citation=reader.attribute("/", "citation", str, ""),
+        description=reader.attribute("/", "description", str, ""),
+        radar=radar,
+        trajectory=Trajectory(
+            timestamp_s,
+            np.zeros((shape[0], 3)) if position_m is None else position_m,
+            np.zeros(shape[0]) if yaw_rad is None else yaw_rad,
+        ),
+        truth=_read_truth(reader, shape[0]),
+        preamble=preamble,
+        sts1=sts[0],
+        sts2=sts[1],
+        **tracks,
+        odometry_position_m=reader.track(f"{base}/odometry_position_m", (shape[0], 3)),
+        receivers=receivers,
+    )
+
+
+def _read_truth(reader: _Reader, frames: int) -> Truth | None:
+    if "truth" not in reader.file:
+        return None
+    objects = []
+    names = sorted(reader.group("/truth/objects")) if "objects" in reader.group("/truth") else []
+    for name in names:
+        where = f"/truth/objects/{name}"
+        material = reader.attribute(where, "material", str)
+        outline = reader.dataset(f"{where}/outline_m")
+        assert outline is not None  # noqa: S101
+        values = np.asarray(outline[...], dtype=np.float64) if outline.dtype.kind in "fiu" else np.empty(0)
+        fits = values.ndim in (2, 3) and values.shape[-1] in (2, 3) and values.shape[-2] >= 1
+        if not fits or (values.ndim == 3 and len(values) != frames):
+            expected = f"float64 [vertices, 2 or 3], or [{frames} frames, vertices, 2 or 3]"
+            raise reader.fail(f"{where}/outline_m", f"expected {expected}, found {outline.dtype} {outline.shape}")
+        if values.ndim == 2 and not np.all(np.isfinite(values)):
+            raise reader.fail(f"{where}/outline_m", "expected finite coordinates")
+        objects.append(Obstacle(name, material, values, bool(reader.attribute(where, "structure", bool, False))))
+    return Truth(tuple(objects), bool(reader.attribute("/truth", "exhaustive", bool)))
+
+
+def write_capture(path: str | os.PathLike[str], *captures: Capture) -> None:
+    """Write one run, one capture for each receiver, into a capture file.
+
+    The file appears complete or not at all: it is written beside its place and then renamed.
+
+    Parameters
+    ----------
+    path : path
+        File to write; an existing one is replaced.
+    *captures : Capture
+        Receivers of the same run; their ``radar.receiver`` names differ.
+
+    Raises
+    ------
+    CaptureError
+        If the folder cannot be written to, or the receivers do not belong together.
+    """
+    target = Path(path)
+    names = [capture.radar.receiver for capture in captures]
+    if not captures or len(set(names)) != len(names) or any("/" in name or not name for name in names):
+        raise CaptureError(f"{target}: a capture file needs receivers with distinct names without '/', not {names}")
+    partial = None
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        handle, partial = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}-", suffix=".part")
+        os.close(handle)
+        with h5py.File(partial, "w") as file:
+            _write(file, captures)
+        Path(partial).replace(target)
+    except OSError as error:
+        raise CaptureError(f"{target}: cannot be written: {error}") from error
+    finally:
+        if partial is not None:
+            Path(partial).unlink(missing_ok=True)
+
+
+def _write(file: h5py.File, captures: Sequence[Capture]) -> None:
+    first = captures[0]
+    moves = first.truth is not None and any(thing.moves for thing in first.truth.objects)
+    file.attrs.update({"format": FORMAT, "format_version": "1.1" if moves else "1.0", "name": first.name})
+    file.attrs.update({"source": first.source, "license": first.license})
+    for name in ("citation", "description"):
+        if getattr(first, name):
+            file.attrs[name] = getattr(first, name)
+    radar = file.create_group("radar")
+    for name in ("model", "center_frequency_hz", "bandwidth_hz", "sample_interval_s", "frame_rate_hz", "samples"):
+        radar.attrs[name] = getattr(first.radar, name)
+    if first.radar.channel is not None:
+        radar.attrs["channel"] = first.radar.channel
+    for capture in captures:
+        _write_receiver(file.create_group(f"receivers/{capture.radar.receiver}"), capture)
+    if first.truth is not None:
+        truth = file.create_group("truth")
+        truth.attrs["exhaustive"] = first.truth.exhaustive
+        truth.create_group("objects")
+        for thing in first.truth.objects:
+            if "/" in thing.name or not thing.name:
+                raise CaptureError(f"object name '{thing.name}' cannot be stored: it must not be empty or hold '/'")
+            group = truth.create_group(f"objects/{thing.name}")
+            group.attrs["material"] = thing.material
+            if thing.structure:
+                group.attrs["structure"] = True
+            group.create_dataset("outline_m", data=np.asarray(thing.outline_m, np.float64))
+
+
+def _write_receiver(group: h5py.Group, capture: Capture) -> None:
+    radar = capture.radar
+    for name in ("mount_position_m", "mount_yaw_rad", "tx_position_m", "noise_taps"):
+        group.attrs[name] = getattr(radar, name)
+    for name in _RECEIVER_OPTIONAL:
+        if getattr(radar, name) is not None:
+            group.attrs[name] = getattr(radar, name)
+    for name in ("preamble", "sts1", "sts2"):
+        samples = getattr(capture, name)
+        if samples is None:
+            continue
+        kind = np.dtype(np.float32 if radar.samples == "rf" and name == "preamble" else np.complex64)
+        stored = group.create_dataset(name, shape=samples.shape, dtype=kind)
+        for start in range(0, samples.shape[0], 65536):
+            stored[start : start + 65536] = samples[start : start + 65536]
+    group.create_dataset("timestamp_s", data=np.asarray(capture.trajectory.timestamp_s, np.float64))
+    group.create_dataset("position_m", data=np.asarray(capture.trajectory.position_m, np.float64))
+    group.create_dataset("yaw_rad", data=np.asarray(capture.trajectory.yaw_rad, np.float64))
+    for name in (*_TRACKS, "odometry_position_m"):
+        values = getattr(capture, name)
+        if values is not None:
+            group.create_dataset(name, data=np.asarray(values, np.float64))

@@ -1,0 +1,124 @@
+"""One step of a detector: what a stage declares, and what it does with a block of frames."""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar, Generic, Literal, TypeVar, get_args, get_origin
+
+from pydantic import BaseModel, ConfigDict
+
+from uwbbench.api.arrays import BoolArray
+from uwbbench.api.block import Block
+from uwbbench.api.radar import Radar
+from uwbbench.api.truth import Trajectory, Truth
+
+Fidelity = Literal["from-source", "reconstruction", "baseline", "reference"]
+"""Where an algorithm comes from: a source that was read, a reconstruction in kind, a textbook, or no detector at all."""
+
+
+class Params(BaseModel):
+    """Parameters of a plugin: unknown keys are errors, values are checked, nothing changes after loading."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+P = TypeVar("P", bound=Params)
+
+
+def params_type_of(cls: type, base: type) -> type[Params]:
+    """Parameter model that ``cls`` names as ``base[Model]``, looked up along its bases."""
+    for ancestor in cls.__mro__:
+        for generic in getattr(ancestor, "__orig_bases__", ()):
+            arguments = get_args(generic)
+            origin = get_origin(generic)
+            if arguments and isinstance(origin, type) and issubclass(origin, base) and isinstance(arguments[0], type):
+                model: type[Params] = arguments[0]
+                return model
+    return Params
+
+
+class Stage(Generic[P]):
+    """One step of a detector.
+
+    A stage is written once, for a block of consecutive frames of any length; the stream hands it short blocks, the
+    batch a long one, and both must give the same answer for any cut. State between blocks lives on the instance and
+    starts in :meth:`open`; an instance serves one stream.
+
+    Class attributes
+    ----------------
+    consumes : frozenset of str
+        Ports that an earlier stage must have produced.
+    produces : frozenset of str
+        Ports that later stages may use: ``first_path``, ``noise``, ``profile``, ``detections``, or the name of a
+        column of detections.
+    removes : frozenset of str
+        Ports that are gone behind this stage, for example ``frames`` where detections are held back.
+    needs : frozenset of str
+        What the capture must have: ``sts`` or ``truth``.
+    rowwise : bool
+        True where each detection's new columns depend on that row and its frame alone. Rejected candidates are then
+        described in the same way, for scorings that ask what the filters removed.
+    fidelity : str
+        ``from-source``, ``reconstruction``, ``baseline`` or ``reference``.
+    """
+
+    consumes: ClassVar[frozenset[str]] = frozenset()
+    produces: ClassVar[frozenset[str]] = frozenset()
+    removes: ClassVar[frozenset[str]] = frozenset()
+    needs: ClassVar[frozenset[str]] = frozenset()
+    rowwise: ClassVar[bool] = False
+    fidelity: ClassVar[Fidelity] = "baseline"
+
+    def __init__(self, params: P) -> None:
+        self.params: P = params
+        self.notes: list[str] = []
+        self.radar: Radar
+
+    @classmethod
+    def params_type(cls) -> type[Params]:
+        """Pydantic model of the parameters."""
+        return params_type_of(cls, Stage)
+
+    def open(self, radar: Radar) -> None:
+        """Start a stream: set the state that lives between blocks. Overriders call this first."""
+        self.radar = radar
+        self.notes = []
+
+    def show_truth(self, truth: Truth, trajectory: Trajectory) -> None:
+        """Receive the ground truth; called only for stages that need ``truth``, which no real detector does."""
+
+    def step(self, block: Block) -> Block:
+        """Block with what this stage adds; may cover other frames than it was given, if it holds some back."""
+        raise NotImplementedError
+
+    def flush(self) -> Block | None:
+        """Whatever is still held back at the end of the stream."""
+        return None
+
+    def note(self, text: str) -> None:
+        """Tell the reader of the results something, once."""
+        if text not in self.notes:
+            self.notes.append(text)
+
+
+class Filter(Stage[P]):
+    """A stage that only drops detections."""
+
+    rowwise: ClassVar[bool] = True
+
+    def keep(self, block: Block) -> BoolArray:
+        """Mask of the detections to keep. Write the condition that accepts, so that NaN is rejected."""
+        raise NotImplementedError
+
+    def step(self, block: Block) -> Block:
+        """Block without the detections that :meth:`keep` drops."""
+        return block.replace(detections=block.detections.take(self.keep(block)))
+
+
+def ports(*names: str) -> frozenset[str]:
+    """Set of port names, to declare what a stage consumes and produces."""
+    return frozenset(names)
+
+
+def describe(cls: type[Any]) -> str:
+    """First line of a plugin's docstring."""
+    return (cls.__doc__ or "").strip().partition("\n")[0]

@@ -1,0 +1,215 @@
+"""The detector file: stages in order, each with checked parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from uwbbench import registry
+from uwbbench.api.errors import ConfigError, PluginError
+from uwbbench.config.check import checked
+from uwbbench.config.locate import find_config
+from uwbbench.config.override import merged, with_values
+from uwbbench.config.yaml_file import YamlFile, parse_yaml, read_yaml
+
+BY_CHANNEL = "by_channel"
+"""Key of a parameter whose value depends on the capture's channel: ``{by_channel: {5: 1.0, 9: 0.2, other: 0.2}}``."""
+
+
+class StepModel(BaseModel):
+    """One stage of a detector file."""
+
+    model_config = ConfigDict(extra="forbid", populate_by_name=True)
+
+    use: str = Field(description="Registered name of the stage.")
+    label: str | None = Field(None, alias="as", description="Another name for this step, where a stage is used twice.")
+    params: dict[str, Any] = Field(default_factory=dict, description="Parameters of the stage.")
+    optional: bool = Field(
+        False, description="Leave the stage out, with a note, where the capture lacks what it needs (such as STS)."
+    )
+
+
+class DetectorModel(BaseModel):
+    """A detector: an ordered list of stages."""
+
+    model_config = ConfigDict(extra="forbid", populate_by_name=True)
+
+    version: Literal[1] = Field(alias="schema", description="Version of this file format.")
+    name: str = Field(min_length=1, description="Name in tables and reports.")
+    description: str = ""
+    citation: str = ""
+    fidelity: Literal["from-source", "reconstruction", "baseline", "reference"] = "baseline"
+    extends: str | None = Field(None, description="Detector (name or file) that this one changes.")
+    set: dict[str, Any] = Field(default_factory=dict, description="Values to change in the extended detector, by path.")
+    pipeline: list[StepModel] = Field(min_length=1)
+
+
+@dataclass(frozen=True)
+class Step:
+    """One stage of a detector, with parameters as written.
+
+    Attributes
+    ----------
+    use, label : str
+        Stage name, and the name of this step.
+    params : dict
+        Raw parameters; values may depend on the channel.
+    optional : bool
+        May be left out where the capture lacks what the stage needs.
+    """
+
+    use: str
+    label: str
+    params: dict[str, Any] = field(default_factory=dict)
+    optional: bool = False
+
+    def params_for(self, channel: int | None) -> tuple[dict[str, Any], list[str]]:
+        """Parameters for a channel, and the names of those that fell back to ``other``."""
+        resolved, fallen = {}, []
+        for name, value in self.params.items():
+            if isinstance(value, dict) and set(value) == {BY_CHANNEL}:
+                table = value[BY_CHANNEL]
+                if channel in table:
+                    value = table[channel]
+                elif "other" in table:
+                    value = table["other"]
+                    fallen.append(name)
+                else:
+                    raise ConfigError(
+                        f"{self.label}: '{name}' has values for channels {', '.join(map(str, table))} and no 'other'; "
+                        f"the capture's channel is {channel}"
+                    )
+            resolved[name] = value
+        return resolved, fallen
+
+
+@dataclass(frozen=True)
+class DetectorConfig:
+    """A validated detector file.
+
+    Attributes
+    ----------
+    name, description, citation, fidelity : str
+    steps : tuple of Step
+    """
+
+    name: str
+    steps: tuple[Step, ...]
+    description: str = ""
+    citation: str = ""
+    fidelity: str = "baseline"
+
+    def to_dict(self) -> dict[str, Any]:
+        """Resolved file as plain values: what a manifest stores and an identity is made of."""
+        steps = [{"use": s.use, "as": s.label, "params": s.params, "optional": s.optional} for s in self.steps]
+        return {"schema": 1, "name": self.name, "fidelity": self.fidelity, "pipeline": steps}
+
+
+def read_detector(
+    name: str, relative_to: Path | None = None, changes: Mapping[str, Any] | None = None
+) -> DetectorConfig:
+    """Read a detector by name or path.
+
+    Parameters
+    ----------
+    name : str
+        Shipped or registered name, or a path to a YAML file.
+    relative_to : Path, optional
+        Folder that a relative path starts from.
+    changes : mapping, optional
+        Values to change, by path, before checking.
+
+    Raises
+    ------
+    ConfigError, PluginError
+        If the file is missing or wrong, or names a stage that is not installed.
+    """
+    path = find_config("detectors", name, relative_to)
+    source = read_yaml(path)
+    data = _extended(source, path.parent, (path.resolve(),))
+    if changes:
+        data = with_values(data, changes, "--set")
+    return check_detector(data, source)
+
+
+def detector_from_text(text: str, name: str = "detector") -> DetectorConfig:
+    """Detector from YAML text, as :func:`read_detector` does from a file."""
+    source = parse_yaml(text, name)
+    return check_detector(_extended(source, Path(), ()), source)
+
+
+def _extended(source: YamlFile, folder: Path, seen: tuple[Path, ...]) -> dict[str, Any]:
+    data = dict(source.data)
+    parent = data.get("extends")
+    if parent is None:
+        return data
+    if not isinstance(parent, str):
+        raise ConfigError(f"{source.place(('extends',))}: expected the name or path of a detector, found {parent!r}")
+    path = find_config("detectors", parent, folder)
+    if path.resolve() in seen:
+        raise ConfigError(f"{source.place(('extends',))}: detectors extend each other in a circle")
+    base = _extended(read_yaml(path), path.parent, (*seen, path.resolve()))
+    changes = data.pop("set", None) or {}
+    if not isinstance(changes, dict):
+        raise ConfigError(f"{source.place(('set',))}: expected values by path")
+    base.pop("extends", None)
+    data.pop("extends")
+    return merged(with_values(base, changes, source.place(("set",))), data)
+
+
+def check_detector(data: Mapping[str, Any], source: YamlFile) -> DetectorConfig:
+    """Detector from resolved values; every stage is looked up and every parameter checked."""
+    model = checked(DetectorModel, data, source)
+    if model.set:
+        raise ConfigError(f"{source.place(('set',))}: 'set' changes an extended detector, but 'extends' is missing")
+    steps: list[Step] = []
+    for index, item in enumerate(model.pipeline):
+        label = item.label or item.use
+        if label in {step.label for step in steps}:
+            raise ConfigError(
+                f"{source.place(('pipeline', index))}: step '{label}' appears twice; name one of them with 'as'"
+            )
+        step = Step(item.use, label, item.params, item.optional)
+        _check_params(step, source, index)
+        steps.append(step)
+    return DetectorConfig(model.name, tuple(steps), model.description, model.citation, model.fidelity)
+
+
+def _check_params(step: Step, source: YamlFile, index: int) -> None:
+    """Check a step's parameters for each channel that they distinguish."""
+    at = ("pipeline", index)
+    try:
+        stage = registry.load("stages", step.use)
+    except PluginError as error:
+        raise PluginError(f"{source.place((*at, 'use'))}: {error}") from error
+    channels: set[Any] = set()
+    for name, value in step.params.items():
+        if isinstance(value, dict) and BY_CHANNEL in value:
+            table = value[BY_CHANNEL]
+            wrong = set(value) != {BY_CHANNEL} or not isinstance(table, dict) or not table
+            if wrong or any(key != "other" and not isinstance(key, int) for key in table):
+                place = source.place((*at, "params", name))
+                raise ConfigError(f"{place}: by_channel expects channel numbers and 'other' as keys")
+            channels |= set(table) - {"other"}
+    for channel in channels or {None}:
+        try:
+            params, _ = step.params_for(channel)
+        except ConfigError as error:
+            raise ConfigError(f"{source.place((*at, 'params'))}: {error}") from error
+        checked(stage.params_type(), params, source, (*at, "params"))
+    if channels:
+        others, _ = step.params_for(None) if _has_other(step) else ({}, [])
+        if others:
+            checked(stage.params_type(), others, source, (*at, "params"))
+
+
+def _has_other(step: Step) -> bool:
+    return all(
+        "other" in value[BY_CHANNEL]
+        for value in step.params.values()
+        if isinstance(value, dict) and BY_CHANNEL in value
+    )

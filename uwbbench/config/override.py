@@ -1,0 +1,88 @@
+"""Changing values of a parsed file: ``extends``, ``set`` and ``--set a.b=c``."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from uwbbench.api.errors import ConfigError, nearest
+
+
+def merged(base: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
+    """Mapping with the values of ``over`` on top; nested mappings merge, lists and scalars replace."""
+    result = dict(base)
+    for key, value in over.items():
+        mine = result.get(key)
+        result[key] = merged(mine, value) if isinstance(mine, dict) and isinstance(value, Mapping) else value
+    return result
+
+
+def with_values(data: Mapping[str, Any], changes: Mapping[str, Any], where: str) -> dict[str, Any]:
+    """Copy of parsed YAML with single values changed.
+
+    Parameters
+    ----------
+    data : mapping
+        Parsed file.
+    changes : mapping
+        Value by dotted path. An item of a list is addressed by its number, or by the value of its ``as`` or ``use``
+        key even where that holds dots: ``pipeline.filter.width.params.minimum``.
+    where : str
+        Who asks, for messages.
+
+    Raises
+    ------
+    ConfigError
+        If a path leads nowhere.
+    """
+    result: dict[str, Any] = copy.deepcopy(dict(data))
+    for path, value in changes.items():
+        _set(result, path, value, where)
+    return result
+
+
+def _set(data: dict[str, Any], path: str, value: Any, where: str) -> None:
+    here: Any = data
+    rest = path
+    key: str | int
+    while rest:
+        if isinstance(here, list):
+            key, rest = _item(here, rest, path, where)
+        elif isinstance(here, dict):
+            key, _, rest = rest.partition(".")
+        else:
+            raise ConfigError(f"{where}: '{path}' leads into a single value")
+        if not rest:
+            here[key] = value
+            return
+        if isinstance(here, dict):
+            if key in here and not isinstance(here[key], dict | list):
+                raise ConfigError(f"{where}: '{path}': '{key}' is a single value")
+            here.setdefault(key, {})
+        here = here[key]
+
+
+def _item(items: list[Any], rest: str, path: str, where: str) -> tuple[int, str]:
+    names = {}
+    for index, item in enumerate(items):
+        names[str(index)] = index
+        if isinstance(item, dict):
+            names.setdefault(str(item.get("as") or item.get("use")), index)
+    for name in sorted(names, key=len, reverse=True):
+        if rest == name or rest.startswith(f"{name}."):
+            return names[name], rest[len(name) + 1 :]
+    raise ConfigError(f"{where}: '{path}': no item '{rest}'.{nearest(rest, names)}")
+
+
+def parse_settings(texts: Iterable[str]) -> dict[str, Any]:
+    """Options ``a.b=value`` as changes by path; values follow the YAML rules."""
+    from uwbbench.config.yaml_file import parse_value
+
+    changes = {}
+    for text in texts:
+        path, equals, value = text.partition("=")
+        if not equals or not path.strip():
+            raise ConfigError(f"--set {text}: expected key=value, for example --set gate_m=0.1")
+        changes[path.strip()] = parse_value(value)
+    return changes

@@ -1,0 +1,142 @@
+"""Safe YAML with the value rules of YAML 1.2 and the line of every key.
+
+Only ``true`` and ``false`` are booleans, so ``on``, ``no`` and ``10:30`` stay text and ``1e-3`` is a number. A key
+given twice is an error. Nothing but mappings, lists, text, numbers, booleans and null can come out.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from uwbbench.api.errors import ConfigError
+
+Path_ = tuple[str | int, ...]
+_MAX_NODES = 100_000
+
+
+class _Loader(yaml.SafeLoader):
+    """PyYAML's safe loader with the scalar rules of the YAML 1.2 core schema."""
+
+
+_Loader.yaml_implicit_resolvers = {}
+for _tag, _pattern, _starts in (
+    ("bool", r"^(?:true|True|TRUE|false|False|FALSE)$", "tTfF"),
+    ("null", r"^(?:~|null|Null|NULL|)$", ["~", "n", "N", ""]),
+    ("int", r"^(?:[-+]?[0-9]+|0o[0-7]+|0x[0-9a-fA-F]+)$", "-+0123456789"),
+    (
+        "float",
+        r"^(?:[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?|[-+]?\.(?:inf|Inf|INF)|\.(?:nan|NaN|NAN))$",
+        "-+0123456789.",
+    ),
+):
+    _Loader.add_implicit_resolver(f"tag:yaml.org,2002:{_tag}", re.compile(_pattern), list(_starts))
+
+
+@dataclass(frozen=True)
+class YamlFile:
+    """A parsed file.
+
+    Attributes
+    ----------
+    name : str
+        File name for messages.
+    data : dict
+        Its mapping.
+    lines : dict
+        Line number of each key, by its path.
+    """
+
+    name: str
+    data: dict[str, Any]
+    lines: dict[Path_, int]
+
+    def place(self, path: Path_) -> str:
+        """``file:line: key`` of a path, as near as it exists."""
+        for length in range(len(path), 0, -1):
+            if path[:length] in self.lines:
+                return f"{self.name}:{self.lines[path[:length]]}: {dotted(path)}"
+        return f"{self.name}: {dotted(path)}" if path else self.name
+
+
+def dotted(path: Path_) -> str:
+    """Path as people write it: ``pipeline[2].params.minimum``."""
+    text = ""
+    for part in path:
+        text += f"[{part}]" if isinstance(part, int) else f".{part}" if text else str(part)
+    return text
+
+
+def read_yaml(path: Path) -> YamlFile:
+    """Read one YAML file.
+
+    Raises
+    ------
+    ConfigError
+        If it cannot be read or is not a mapping.
+    """
+    try:
+        text = path.read_text(encoding="utf-8")
+    except OSError as error:
+        raise ConfigError(f"{path}: cannot be read: {error.strerror or error}") from error
+    except UnicodeDecodeError as error:
+        raise ConfigError(f"{path}: is not UTF-8 text ({error.reason} at byte {error.start})") from error
+    return parse_yaml(text, str(path))
+
+
+def parse_yaml(text: str, name: str) -> YamlFile:
+    """Parse YAML text; ``name`` stands for the file in messages."""
+    try:
+        loader = _Loader(text)
+        node = loader.get_single_node()
+        lines: dict[Path_, int] = {}
+        data = _Builder(loader, name, lines).value(node, ()) if node is not None else {}
+    except (yaml.YAMLError, ValueError, RecursionError) as error:
+        mark = getattr(error, "problem_mark", None)
+        where = f"{name}:{mark.line + 1}" if mark else name
+        problem = getattr(error, "problem", None) or str(error) or "nested too deeply"
+        raise ConfigError(f"{where}: not valid YAML: {problem}") from error
+    if not isinstance(data, dict):
+        raise ConfigError(f"{name}: expected keys and values, found {type(data).__name__}")
+    return YamlFile(name, data, lines)
+
+
+def parse_value(text: str) -> Any:
+    """Value of one option such as ``--set a.b=VALUE``, by the same rules."""
+    return parse_yaml(f"value: {text}" if text.strip() else "value: ''", "--set").data["value"]
+
+
+class _Builder:
+    """Turns the node tree into plain values, noting the line of each key."""
+
+    def __init__(self, loader: _Loader, name: str, lines: dict[Path_, int]) -> None:
+        self.loader, self.name, self.lines, self.count = loader, name, lines, 0
+
+    def value(self, node: Any, path: Path_) -> Any:
+        self.count += 1
+        if self.count > _MAX_NODES:
+            raise ConfigError(f"{self.name}: more than {_MAX_NODES} values; aliases multiply them")
+        self.lines.setdefault(path, node.start_mark.line + 1)
+        if isinstance(node, yaml.SequenceNode):
+            return [self.value(item, (*path, index)) for index, item in enumerate(node.value)]
+        if isinstance(node, yaml.MappingNode):
+            return self._mapping(node, path)
+        return self.loader.construct_object(node)
+
+    def _mapping(self, node: Any, path: Path_) -> dict[Any, Any]:
+        found: dict[Any, Any] = {}
+        for key_node, value_node in node.value:
+            line = key_node.start_mark.line + 1
+            if not isinstance(key_node, yaml.ScalarNode):
+                raise ConfigError(f"{self.name}:{line}: a key must be a single word or number")
+            key = self.loader.construct_object(key_node)
+            key = key_node.value if key is None or isinstance(key, bool | float) else key
+            if key in found:
+                raise ConfigError(f"{self.name}:{line}: key '{dotted((*path, key))}' is given twice")
+            self.lines[(*path, key)] = line
+            found[key] = self.value(value_node, (*path, key))
+        return found
