@@ -135,9 +135,9 @@ class Detections:
         chain: Mapping[str, int] | None = None,
     ) -> Detections:
         """Return the same rows with other facts about them; what is not given stays."""
-        columns: dict[str, Any] = self.columns
+        facts: dict[str, Any] = self.columns
         return Detections(
-            **columns,
+            **facts,
             processed=self.processed if processed is None else processed,
             notes=self.notes if notes is None else notes,
             candidates=self._candidates if candidates is None else candidates,
@@ -145,8 +145,9 @@ class Detections:
         )
 
     def _with(self, columns: Mapping[str, ArrayLike]) -> Detections:
+        facts: dict[str, Any] = dict(columns)
         return Detections(
-            **columns, processed=self.processed, notes=self.notes, candidates=self._candidates, chain=self.chain
+            **facts, processed=self.processed, notes=self.notes, candidates=self._candidates, chain=self.chain
         )
 
     @staticmethod

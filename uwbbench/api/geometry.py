@@ -66,7 +66,8 @@ def to_world(
     Targets are taken at the receiver's height, as the radar has no elevation.
     """
     heading = boresight_rad + azimuth_rad
-    return receiver_m[:, :2] + range_m[:, None] * np.stack([np.cos(heading), np.sin(heading)], axis=-1)
+    ahead = np.stack([np.cos(heading), np.sin(heading)], axis=-1)
+    return np.asarray(receiver_m[:, :2] + range_m[:, None] * ahead)
 
 
 def direction(azimuth_rad: FloatArray) -> FloatArray:

@@ -12,7 +12,7 @@ from uwbbench.api.radar import Radar
 from uwbbench.api.truth import Trajectory, Truth
 
 Fidelity = Literal["from-source", "reconstruction", "baseline", "reference"]
-"""Where an algorithm comes from: a source that was read, a reconstruction in kind, a textbook, or no detector at all."""
+"""Where an algorithm comes from: a source that was read, a reconstruction in kind, a textbook, or no detector."""
 
 
 class Params(BaseModel):
