@@ -14,7 +14,7 @@ _DATA = Path(os.environ.get("UWBBENCH_DATA", Path(__file__).parents[2] / "shared
 def simulated_approach(**params: object) -> Capture:
     """One run of the built-in simulated approach."""
     adapter = load("datasets", "approach")
-    dataset = adapter(adapter.params_type().model_validate(params), Path())
+    dataset = adapter(adapter.params_type().model_validate(params), ())
     return dataset.open(dataset.names()[0])
 
 

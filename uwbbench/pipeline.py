@@ -24,7 +24,11 @@ from uwbbench.config.detector import DetectorConfig, detector_from_text, read_de
 BATCH_FRAMES = 4096
 """Frames a block of :meth:`Pipeline.run`: large enough to be fast, small enough for a million frames."""
 
-_NEEDS = {"sts": "STS responses of two antennas", "truth": "ground truth"}
+_NEEDS = {
+    "sts": "STS responses of two antennas",
+    "truth": "ground truth",
+    "first_path": "reported first path",
+}
 
 
 @dataclass(frozen=True)
@@ -164,9 +168,16 @@ class Pipeline:
             If the capture lacks what a stage needs and the stage is not optional.
         """
         radar = capture.radar
-        has = {"sts"} if radar.has_sts else set()
-        if capture.truth is not None:
-            has.add("truth")
+        counted_from_transmission = radar.first_tap_delay_s is not None
+        has = {
+            name
+            for name, there in (
+                ("sts", radar.has_sts),
+                ("truth", capture.truth is not None),
+                ("first_path", radar.has_first_path or counted_from_transmission),
+            )
+            if there
+        }
         available = {"frames"}
         stages, notes = [], []
         for step in self.config.steps:

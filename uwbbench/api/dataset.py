@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import ClassVar, Generic, Literal
@@ -61,15 +62,15 @@ class Dataset(Generic[P]):
     ----------
     params : Params
         Checked parameters from the experiment.
-    root : Path
-        Where relative paths of the parameters start, and where the card's folder lies.
+    roots : sequence of Path
+        Folders searched, in this order, for the card's folder and for relative paths of the parameters.
     """
 
     card: ClassVar[Card]
 
-    def __init__(self, params: P, root: Path) -> None:
+    def __init__(self, params: P, roots: Sequence[Path]) -> None:
         self.params: P = params
-        self.root = root
+        self.roots = tuple(roots)
 
     @classmethod
     def params_type(cls) -> type[Params]:
@@ -91,11 +92,21 @@ class Dataset(Generic[P]):
         raise NotImplementedError
 
     def file(self, path: str) -> Path:
-        """One of the card's files on disk: in the data directory itself or in the dataset's folder below it."""
-        for folder in (self.root / self.card.folder, self.root):
-            if (folder / path).is_file():
-                return folder / path
+        """One of the dataset's files on disk: in one of the roots, or in the card's folder below it.
+
+        Raises
+        ------
+        CaptureError
+            If it is in none of them, or the path leads out of them.
+        """
+        if Path(path).is_absolute() or ".." in Path(path).parts:
+            raise CaptureError(f"dataset file '{path}' must lie below the dataset's folder")
+        for root in self.roots:
+            for folder in (root / self.card.folder, root):
+                if (folder / path).is_file():
+                    return folder / path
+        searched = ", ".join(str(root) for root in self.roots)
         raise CaptureError(
-            f"dataset file '{self.card.folder}/{path}' is not in {self.root}: "
-            f"point --data-dir or UWBBENCH_DATA at it, or download it with 'uwbbench fetch'"
+            f"dataset file '{Path(self.card.folder) / path}' is not in {searched}: "
+            f"point --data-dir or UWBBENCH_DATA at its folder, or download it with 'uwbbench fetch'"
         )

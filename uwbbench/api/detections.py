@@ -165,7 +165,8 @@ class Detections:
         notes = tuple(dict.fromkeys(note for part in parts for note in part.notes))
         frame = np.concatenate([part.frame for part in parts]) if parts else np.empty(0, np.int64)
         seen = np.unique(np.concatenate([part.processed for part in parts])) if parts else np.empty(0, np.int64)
-        return Detections(frame, processed=seen, notes=notes, **columns)
+        facts: dict[str, Any] = columns
+        return Detections(frame, processed=seen, notes=notes, **facts)
 
     def to_pandas(self) -> pd.DataFrame:
         """Table with :data:`COLUMNS` first, then columns of plugins.

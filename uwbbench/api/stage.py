@@ -53,7 +53,7 @@ class Stage(Generic[P]):
     removes : frozenset of str
         Ports that are gone behind this stage, for example ``frames`` where detections are held back.
     needs : frozenset of str
-        What the capture must have: ``sts`` or ``truth``.
+        What the capture must have: ``sts``, ``truth`` or a reported ``first_path``.
     rowwise : bool
         True where each detection's new columns depend on that row and its frame alone. Rejected candidates are then
         described in the same way, for scorings that ask what the filters removed.

@@ -1,0 +1,100 @@
+"""Captures as a configuration names them: a dataset, its parameters, and a name inside it."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from uwbbench import registry
+from uwbbench.api.capture import Capture
+from uwbbench.api.dataset import Dataset
+from uwbbench.config.check import checked
+from uwbbench.config.yaml_file import Path_, YamlFile
+
+
+def data_roots(data_dir: Path | None = None, config_file: Path | None = None) -> tuple[Path, ...]:
+    """Folders in which datasets are searched.
+
+    In this order: ``--data-dir``, the environment's ``UWBBENCH_DATA``, the folder of the configuration file, the
+    current folder, and the cache that ``uwbbench fetch`` fills.
+    """
+    named = os.environ.get("UWBBENCH_DATA")
+    folders = [
+        data_dir,
+        Path(named) if named else None,
+        config_file.parent if config_file else None,
+        Path(),
+        cache_folder(),
+    ]
+    return tuple(dict.fromkeys(folder.resolve() for folder in folders if folder is not None))
+
+
+def cache_folder() -> Path:
+    """Folder of downloaded datasets: ``UWBBENCH_CACHE``, or ``uwbbench`` in the user's cache folder."""
+    named = os.environ.get("UWBBENCH_CACHE")
+    if named:
+        return Path(named)
+    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "uwbbench"
+
+
+def open_dataset(
+    use: str,
+    params: Mapping[str, Any],
+    roots: Sequence[Path],
+    source: YamlFile | None = None,
+    at: Path_ = (),
+) -> Dataset[Any]:
+    """Dataset adapter with checked parameters.
+
+    Raises
+    ------
+    PluginError, ConfigError
+        If the adapter is unknown or a parameter wrong; messages name ``source`` and the place in it.
+    """
+    adapter = registry.load("datasets", use)
+    place = source or YamlFile(f"dataset '{use}'", dict(params), {})
+    dataset: Dataset[Any] = adapter(checked(adapter.params_type(), dict(params), place, at), roots)
+    return dataset
+
+
+@dataclass(frozen=True)
+class CaptureRef:
+    """A capture that can be opened here or in another process.
+
+    Attributes
+    ----------
+    dataset : str
+        Name of the adapter.
+    params : dict
+        Its parameters as written.
+    roots : tuple of str
+        Folders to search.
+    name : str
+        Name of the capture in the dataset.
+    """
+
+    dataset: str
+    params: dict[str, Any]
+    roots: tuple[str, ...]
+    name: str
+
+    def open(self) -> Capture:
+        """Open the capture.
+
+        Raises
+        ------
+        CaptureError
+            If its files are missing or broken.
+        """
+        return open_dataset(self.dataset, self.params, [Path(root) for root in self.roots]).open(self.name)
+
+    @classmethod
+    def of_file(cls, path: Path, receiver: str | None = None) -> CaptureRef:
+        """Reference to a capture file."""
+        whole = path.resolve()
+        params = {"files": [str(whole)], **({"receiver": receiver} if receiver else {})}
+        name = whole.stem if receiver is None else f"{whole.stem}/{receiver}"
+        return cls("capture", params, (str(whole.parent),), name)
