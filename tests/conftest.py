@@ -1,10 +1,13 @@
 """Captures that many tests share."""
 
+import importlib
 import os
+import sys
 from pathlib import Path
 
 import pytest
 
+from uwbbench import registry
 from uwbbench.api import Capture
 from uwbbench.registry import load
 
@@ -36,3 +39,37 @@ def data_dir() -> Path:
     if not _DATA.is_dir():
         pytest.skip(f"measured captures not found in {_DATA}; set UWBBENCH_DATA")
     return _DATA
+
+
+@pytest.fixture
+def install_plugin(tmp_path, monkeypatch):
+    """Install a small distribution: ``install_plugin("name", {"stages": {...}}, {"module.py": source})``."""
+
+    def forget() -> None:
+        for known in (registry.entries, registry.load):
+            known.cache_clear()
+        importlib.invalidate_caches()
+
+    def install(name: str, groups: dict[str, dict[str, str]], files: dict[str, str]) -> Path:
+        folder = tmp_path / f"site-{name}"
+        facts = folder / f"{name}-1.0.dist-info"
+        facts.mkdir(parents=True)
+        (facts / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: 1.0\n")
+        lines = []
+        for kind, points in groups.items():
+            lines += [f"[uwbbench.{kind}]", *(f"{key} = {target}" for key, target in points.items())]
+        (facts / "entry_points.txt").write_text("\n".join(lines))
+        for path, text in files.items():
+            (folder / path).parent.mkdir(parents=True, exist_ok=True)
+            (folder / path).write_text(text)
+        monkeypatch.syspath_prepend(str(folder))
+        forget()
+        return folder
+
+    before = set(sys.modules)
+    yield install
+    monkeypatch.undo()
+    for module in set(sys.modules) - before:
+        if str(tmp_path) in str(getattr(sys.modules[module], "__file__", "")):
+            del sys.modules[module]
+    forget()

@@ -71,6 +71,8 @@ class Stream:
         for index, opened in enumerate(self._stages):
             tail = opened.stage.flush()
             if tail is not None:
+                if opened.label in self.chain:
+                    self.chain[opened.label] += len(tail.detections)
                 out.append(self._emit(self._through(tail, index + 1)))
         return Detections.join(out).annotated(notes=self.notes)
 
@@ -234,7 +236,8 @@ class Pipeline:
             module = sys.modules[registry.load("stages", step.use).__module__]
             content = Path(module.__file__).read_bytes() if module.__file__ else b""
             sources[step.use] = hashlib.sha256(content).hexdigest()
-        text = json.dumps({"detector": self.config.to_dict(), "sources": sources}, sort_keys=True)
+        resolved = json.loads(json.dumps(self.config.to_dict()))  # channel numbers become text, which sorts with "other"
+        text = json.dumps({"detector": resolved, "sources": sources}, sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()
 
 

@@ -112,7 +112,7 @@ def detector_file(name: str) -> Path:
     module, _, filename = found.target.partition(":")
     try:
         spec = importlib.util.find_spec(module)
-    except ImportError as error:
+    except Exception as error:  # finding a module imports the packages above it, which may raise anything
         raise PluginError(f"detector '{name}' of {found.package}: no package {module} ({error})") from error
     folders = list(spec.submodule_search_locations or []) if spec else []
     for folder in folders:

@@ -8,6 +8,7 @@ import numpy as np
 from pydantic import Field
 
 from uwbbench.api import Block, ConfigError, FloatArray, IntArray, Params, Radar, Stage, ports
+from uwbbench_detectors.interpolation import vertex_shift
 
 P = TypeVar("P", bound=Params)
 
@@ -152,10 +153,9 @@ class ReportedFirstPath(FirstPath[ReportedFirstPathParams]):
 
 
 def log_parabola(amplitude: FloatArray, tap: IntArray) -> FloatArray:
-    """Distance (frames,) in taps from each maximum to the vertex of the parabola through three log magnitudes.
+    """Distance (frames,) in taps from each crest to the vertex of the parabola through three log magnitudes.
 
-    ``delta = (z- - z+) / (2 (z- - 2 z0 + z+))`` with ``z = log |h|``; exact for a Gaussian pulse. Zero at the edges of
-    the frame, beside samples that are zero, and where the tap is no maximum.
+    Zero at the edges of the frame.
 
     Parameters
     ----------
@@ -165,9 +165,6 @@ def log_parabola(amplitude: FloatArray, tap: IntArray) -> FloatArray:
     """
     inside = (tap > 0) & (tap < amplitude.shape[1] - 1)
     row, middle = np.flatnonzero(inside), tap[inside]
-    near = np.stack([amplitude[row, middle + step] for step in (-1, 0, 1)])
-    usable = (near > 0).all(axis=0) & (near[1] >= near[0]) & (near[1] >= near[2]) & (near[0] + near[2] < 2 * near[1])
-    before, crest, after = np.log(near[:, usable])
     offset = np.zeros(len(tap))
-    offset[row[usable]] = (before - after) / (2 * (before - 2 * crest + after))
+    offset[row] = vertex_shift(amplitude[row, middle - 1], amplitude[row, middle], amplitude[row, middle + 1])
     return offset

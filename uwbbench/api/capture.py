@@ -115,21 +115,31 @@ class Capture(CaptureHeader):
     receivers: tuple[str, ...] = field(default=())
 
     def __post_init__(self) -> None:
+        if len(self.preamble.shape) != 2:
+            raise CaptureError(f"capture '{self.name}': samples have shape (frames, taps), not {self.preamble.shape}")
         frames, taps = self.preamble.shape
         if taps != self.radar.taps:
             raise CaptureError(f"capture '{self.name}': frames have {taps} taps, the radar says {self.radar.taps}")
         if (self.sts1 is None) != (self.sts2 is None):
             raise CaptureError(f"capture '{self.name}': one STS response without the other")
+        for name in ("sts1", "sts2"):
+            samples = getattr(self, name)
+            if samples is not None and samples.shape != self.preamble.shape:
+                shapes = f"{samples.shape}, the preamble {self.preamble.shape}"
+                raise CaptureError(f"capture '{self.name}': {name} has shape {shapes}")
         if self.radar.has_sts != (self.sts1 is not None):
             raise CaptureError(f"capture '{self.name}': radar.has_sts disagrees with the samples given")
         if self.radar.has_first_path != (self.first_path_index is not None):
             raise CaptureError(f"capture '{self.name}': radar.has_first_path disagrees with the data given")
         counts = {"timestamp_s": len(self.trajectory.timestamp_s), "position_m": len(self.trajectory.position_m)}
         counts["yaw_rad"] = len(self.trajectory.yaw_rad)
-        for name in ("sts1", "sts2", *_PER_FRAME):
+        for name in _PER_FRAME:
             value = getattr(self, name)
             if value is not None:
                 counts[name] = value.shape[0]
+        for thing in self.truth.objects if self.truth is not None else ():
+            if thing.moves:
+                counts[f"outline of '{thing.name}'"] = len(thing.outline_m)
         wrong = {name: count for name, count in counts.items() if count != frames}
         if wrong:
             raise CaptureError(f"capture '{self.name}': preamble has {frames} frames, but {wrong}")
@@ -153,18 +163,22 @@ class Capture(CaptureHeader):
         """Frames ``start`` to ``stop`` as complex samples, with the validity mark of each.
 
         Real RF samples become their analytic signal.
+
+        Raises
+        ------
+        CaptureError
+            If the file behind the samples is damaged.
         """
         stop = len(self) if stop is None else min(stop, len(self))
-        raw = np.asarray(self.preamble[start:stop])
+        raw = self._rows("preamble", start, stop)
         valid: BoolArray = np.all(np.isfinite(raw), axis=1)
         if self.radar.samples == "rf":
             with np.errstate(invalid="ignore"):  # an infinite sample makes its whole frame NaN, which is marked invalid
                 raw = analytic(raw)
         extra: dict[str, Any] = {}
         for name in ("sts1", "sts2"):
-            samples = getattr(self, name)
-            if samples is not None:
-                extra[name] = np.asarray(samples[start:stop])
+            if getattr(self, name) is not None:
+                extra[name] = self._rows(name, start, stop)
                 valid = valid & np.all(np.isfinite(extra[name]), axis=1)
         for name in _PER_FRAME:
             if getattr(self, name) is not None:
@@ -178,6 +192,12 @@ class Capture(CaptureHeader):
             valid=valid,
             **extra,
         )
+
+    def _rows(self, name: str, start: int, stop: int) -> Any:
+        try:
+            return np.asarray(getattr(self, name)[start:stop])
+        except (OSError, RuntimeError) as error:  # a compressed array is checked only when it is read
+            raise CaptureError(f"capture '{self.name}': {name}: cannot be read, damaged file ({error})") from error
 
     def blocks(self, size: int) -> Iterator[Frames]:
         """Frames in consecutive blocks of ``size``; the last may be shorter."""

@@ -7,8 +7,9 @@ objects that move carry version 1.1, which adds a frame axis to ``outline_m``; e
 
 from __future__ import annotations
 
+import contextlib
 import os
-import tempfile
+import uuid
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, cast
@@ -24,6 +25,10 @@ from uwbbench.api.truth import Obstacle, Trajectory, Truth
 
 FORMAT = "uwbbench-capture"
 _REQUIRED = object()
+_DAMAGE = (OSError, RuntimeError, KeyError, ValueError, TypeError)
+"""What h5py and numpy raise where the metadata of a file are damaged."""
+_POSITIVE = ("center_frequency_hz", "bandwidth_hz", "sample_interval_s", "frame_rate_hz")
+_RADAR = ("model", *_POSITIVE, "samples", "channel")
 _RECEIVER_OPTIONAL = ("array_spacing_m", "first_tap_delay_s")
 _TRACKS = ("first_path_index", "first_path_index_sts1", "first_path_index_sts2", "odometry_yaw_rad")
 
@@ -44,32 +49,35 @@ class _Reader:
         return CaptureError(f"{self.path}: {where}: {text}")
 
     def group(self, where: str) -> Any:
-        found = self._follow(where)
+        found = self.find(where)
         if not isinstance(found, h5py.Group):
             raise self.fail(where, "expected a group, found nothing" if found is None else "expected a group")
         return found
 
-    def _follow(self, where: str) -> Any:
+    def find(self, where: str) -> Any:
         """Object at a path, refusing links that leave the file."""
         here: Any = self.file
         for name in where.strip("/").split("/"):
             if not name:
                 continue
-            if not isinstance(here, h5py.Group) or name not in here:
+            link = here.get(name, getlink=True) if isinstance(here, h5py.Group) else None
+            if link is None:
                 return None
-            if not isinstance(here.get(name, getlink=True), h5py.HardLink):
+            if not isinstance(link, h5py.HardLink):  # asked of the link itself: a dangling one is not in its group
                 raise self.fail(where, "links are not followed; the data must lie in this file")
             here = here[name]
         return here
 
     def attribute(self, where: str, name: str, kind: type, default: Any = _REQUIRED) -> Any:
         attributes = self.file.attrs if where == "/" else self.group(where).attrs
-        label = f"{where.rstrip('/')}@{name}"
+        label = f"{where}@{name}"
         if name not in attributes:
             if default is _REQUIRED:
                 raise self.fail(label, f"attribute missing; expected {kind.__name__}.{nearest(name, attributes)}")
             return default
         value = attributes[name]
+        if isinstance(value, np.ndarray) and value.size == 1:  # as MATLAB writes single values
+            value = value.item()
         try:
             if kind is str:
                 return value.decode() if isinstance(value, bytes) else str(value)
@@ -78,15 +86,26 @@ class _Reader:
                 if len(vector) != 3 or not np.all(np.isfinite(vector)):
                     raise self.fail(label, f"expected 3 finite numbers, found {value!r}")
                 return vector
+            if isinstance(value, str | bytes):
+                raise self.fail(label, f"expected {kind.__name__}, found the text {value!r}")
             number = kind(value)
             if kind is float and not np.isfinite(number):
                 raise self.fail(label, f"expected a finite number, found {value!r}")
+            if kind is not float and number != value:
+                raise self.fail(label, f"expected {kind.__name__}, found {value!r}")
             return number
-        except (TypeError, ValueError) as error:
+        except (TypeError, ValueError, OverflowError) as error:
             raise self.fail(label, f"expected {kind.__name__}, found {value!r}") from error
 
+    def positive(self, where: str, name: str) -> float:
+        """Attribute that must be a positive number."""
+        value: float = self.attribute(where, name, float)
+        if value <= 0:
+            raise self.fail(f"{where}@{name}", f"expected a positive number, found {value!r}")
+        return value
+
     def dataset(self, where: str, *, required: bool = True) -> h5py.Dataset | None:
-        found = self._follow(where)
+        found = self.find(where)
         if found is None:
             if required:
                 raise self.fail(where, "array missing")
@@ -146,6 +165,38 @@ def open_capture(path: str | os.PathLike[str], receiver: str | None = None) -> C
         If the file breaks the format; the message names the path inside the file and what was expected.
     """
     reader = _Reader(Path(path))
+    try:
+        receivers = _receivers(reader)
+        if receiver is None:
+            if len(receivers) > 1:
+                raise reader.fail("/receivers", f"has several receivers, choose one of: {', '.join(receivers)}")
+            receiver = receivers[0]
+        elif receiver not in receivers:
+            raise reader.fail("/receivers", f"no receiver '{receiver}'.{nearest(receiver, receivers)}")
+        return _read(reader, receiver, receivers)
+    except CaptureError as error:
+        text = str(error)
+        raise (error if text.startswith(str(path)) else reader.fail(f"/receivers/{receiver}", text)) from None
+    except _DAMAGE as error:
+        raise CaptureError(f"{path}: damaged HDF5 file ({error})") from error
+
+
+def list_receivers(path: str | os.PathLike[str]) -> tuple[str, ...]:
+    """Names of the receivers in a capture file, sorted.
+
+    Raises
+    ------
+    CaptureError
+        If the file is not a capture file of a readable version.
+    """
+    reader = _Reader(Path(path))
+    try:
+        return _receivers(reader)
+    except _DAMAGE as error:
+        raise CaptureError(f"{path}: damaged HDF5 file ({error})") from error
+
+
+def _receivers(reader: _Reader) -> tuple[str, ...]:
     kind = reader.attribute("/", "format", str)
     if kind != FORMAT:
         raise reader.fail("/@format", f"expected '{FORMAT}', found '{kind}'")
@@ -155,17 +206,7 @@ def open_capture(path: str | os.PathLike[str], receiver: str | None = None) -> C
     receivers = tuple(sorted(reader.group("/receivers")))
     if not receivers:
         raise reader.fail("/receivers", "expected at least one receiver")
-    if receiver is None:
-        if len(receivers) > 1:
-            raise reader.fail("/receivers", f"has several receivers, choose one of: {', '.join(receivers)}")
-        receiver = receivers[0]
-    elif receiver not in receivers:
-        raise reader.fail("/receivers", f"no receiver '{receiver}'.{nearest(receiver, receivers)}")
-    try:
-        return _read(reader, receiver, receivers)
-    except CaptureError as error:
-        text = str(error)
-        raise (error if text.startswith(str(path)) else reader.fail(f"/receivers/{receiver}", text)) from None
+    return receivers
 
 
 def _read(reader: _Reader, receiver: str, receivers: tuple[str, ...]) -> Capture:
@@ -192,10 +233,7 @@ def _read(reader: _Reader, receiver: str, receivers: tuple[str, ...]) -> Capture
     optional = {name: reader.attribute(base, name, float, None) for name in _RECEIVER_OPTIONAL}
     radar = Radar(
         model=reader.attribute("/radar", "model", str),
-        **{
-            name: reader.attribute("/radar", name, float)
-            for name in ("center_frequency_hz", "bandwidth_hz", "sample_interval_s", "frame_rate_hz")
-        },
+        **{name: reader.positive("/radar", name) for name in _POSITIVE},
         taps=shape[1],
         samples="iq" if storage == "iq" else "rf",
         channel=reader.attribute("/radar", "channel", int, None),
@@ -234,10 +272,10 @@ def _read(reader: _Reader, receiver: str, receivers: tuple[str, ...]) -> Capture
 
 
 def _read_truth(reader: _Reader, frames: int) -> Truth | None:
-    if "truth" not in reader.file:
+    if reader.find("/truth") is None:
         return None
     objects = []
-    names = sorted(reader.group("/truth/objects")) if "objects" in reader.group("/truth") else []
+    names = sorted(reader.group("/truth/objects")) if reader.find("/truth/objects") is not None else []
     for name in names:
         where = f"/truth/objects/{name}"
         material = reader.attribute(where, "material", str)
@@ -273,21 +311,45 @@ def write_capture(path: str | os.PathLike[str], *captures: Capture) -> None:
     """
     target = Path(path)
     names = [capture.radar.receiver for capture in captures]
-    if not captures or len(set(names)) != len(names) or any("/" in name or not name for name in names):
+    if not captures or len(set(names)) != len(names) or any(not _storable(name) for name in names):
         raise CaptureError(f"{target}: a capture file needs receivers with distinct names without '/', not {names}")
-    partial = None
+    _check_belong_together(target, captures)
+    partial = target.with_name(f".{target.name}-{uuid.uuid4().hex}.part")
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
-        handle, partial = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}-", suffix=".part")
-        os.close(handle)
-        with h5py.File(partial, "w") as file:
+        with h5py.File(partial, "x") as file:
             _write(file, captures)
-        Path(partial).replace(target)
-    except OSError as error:
+        partial.replace(target)
+    except (OSError, RuntimeError) as error:  # HDF5 reports a full disk as either
         raise CaptureError(f"{target}: cannot be written: {error}") from error
     finally:
-        if partial is not None:
-            Path(partial).unlink(missing_ok=True)
+        with contextlib.suppress(OSError):  # a folder that cannot be looked into holds no partial file either
+            partial.unlink(missing_ok=True)
+
+
+def _storable(name: str) -> bool:
+    """Whether a name can stand for a group in the file."""
+    return bool(name) and "/" not in name and name != "."
+
+
+def _check_belong_together(target: Path, captures: Sequence[Capture]) -> None:
+    """Refuse captures that differ in what a file stores once for all its receivers."""
+    first = captures[0]
+    for other in captures[1:]:
+        differing = [name for name in _RADAR if getattr(other.radar, name) != getattr(first.radar, name)]
+        if _stored(first.truth) != _stored(other.truth):
+            differing.append("truth")
+        if differing:
+            names = f"'{first.radar.receiver}' and '{other.radar.receiver}'"
+            raise CaptureError(f"{target}: receivers {names} are not of one run: they differ in {', '.join(differing)}")
+
+
+def _stored(truth: Truth | None) -> list[Any]:
+    """All that a file keeps of a truth, as values that compare."""
+    objects = truth.objects if truth is not None else ()
+    outlines = [np.asarray(thing.outline_m, np.float64) for thing in objects]
+    labels = [(thing.name, thing.material, thing.structure) for thing in objects]
+    return [truth and truth.exhaustive, labels, [(outline.shape, outline.tobytes()) for outline in outlines]]
 
 
 def _write(file: h5py.File, captures: Sequence[Capture]) -> None:
@@ -295,14 +357,9 @@ def _write(file: h5py.File, captures: Sequence[Capture]) -> None:
     moves = first.truth is not None and any(thing.moves for thing in first.truth.objects)
     file.attrs.update({"format": FORMAT, "format_version": "1.1" if moves else "1.0", "name": first.name})
     file.attrs.update({"source": first.source, "license": first.license})
-    for name in ("citation", "description"):
-        if getattr(first, name):
-            file.attrs[name] = getattr(first, name)
+    file.attrs.update({name: text for name in ("citation", "description") if (text := getattr(first, name))})
     radar = file.create_group("radar")
-    for name in ("model", "center_frequency_hz", "bandwidth_hz", "sample_interval_s", "frame_rate_hz", "samples"):
-        radar.attrs[name] = getattr(first.radar, name)
-    if first.radar.channel is not None:
-        radar.attrs["channel"] = first.radar.channel
+    radar.attrs.update({name: value for name in _RADAR if (value := getattr(first.radar, name)) is not None})
     for capture in captures:
         _write_receiver(file.create_group(f"receivers/{capture.radar.receiver}"), capture)
     if first.truth is not None:
@@ -310,7 +367,7 @@ def _write(file: h5py.File, captures: Sequence[Capture]) -> None:
         truth.attrs["exhaustive"] = first.truth.exhaustive
         truth.create_group("objects")
         for thing in first.truth.objects:
-            if "/" in thing.name or not thing.name:
+            if not _storable(thing.name):
                 raise CaptureError(f"object name '{thing.name}' cannot be stored: it must not be empty or hold '/'")
             group = truth.create_group(f"objects/{thing.name}")
             group.attrs["material"] = thing.material
@@ -323,20 +380,16 @@ def _write_receiver(group: h5py.Group, capture: Capture) -> None:
     radar = capture.radar
     for name in ("mount_position_m", "mount_yaw_rad", "tx_position_m", "noise_taps"):
         group.attrs[name] = getattr(radar, name)
-    for name in _RECEIVER_OPTIONAL:
-        if getattr(radar, name) is not None:
-            group.attrs[name] = getattr(radar, name)
-    for name in ("preamble", "sts1", "sts2"):
+    group.attrs.update({name: value for name in _RECEIVER_OPTIONAL if (value := getattr(radar, name)) is not None})
+    present = [name for name in ("preamble", "sts1", "sts2") if getattr(capture, name) is not None]
+    for name in present:
         samples = getattr(capture, name)
-        if samples is None:
-            continue
         kind = np.dtype(np.float32 if radar.samples == "rf" and name == "preamble" else np.complex64)
         stored = group.create_dataset(name, shape=samples.shape, dtype=kind)
         for start in range(0, samples.shape[0], 65536):
             stored[start : start + 65536] = samples[start : start + 65536]
-    group.create_dataset("timestamp_s", data=np.asarray(capture.trajectory.timestamp_s, np.float64))
-    group.create_dataset("position_m", data=np.asarray(capture.trajectory.position_m, np.float64))
-    group.create_dataset("yaw_rad", data=np.asarray(capture.trajectory.yaw_rad, np.float64))
+    for name in ("timestamp_s", "position_m", "yaw_rad"):
+        group.create_dataset(name, data=np.asarray(getattr(capture.trajectory, name), np.float64))
     for name in (*_TRACKS, "odometry_position_m"):
         values = getattr(capture, name)
         if values is not None:

@@ -159,7 +159,7 @@ def inside(points_m: FloatArray, outline_m: FloatArray) -> BoolArray:
     spans = (starts[..., 1] > y) != (ends[..., 1] > y)
     with np.errstate(divide="ignore", invalid="ignore"):
         slope = (ends[..., 0] - starts[..., 0]) / (ends[..., 1] - starts[..., 1])
-    crossed = spans & (x < slope * (y - starts[..., 1]) + starts[..., 0])
+        crossed = spans & (x < slope * (y - starts[..., 1]) + starts[..., 0])
     return np.asarray(np.sum(crossed, axis=1) % 2 == 1)
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Literal
 
 from uwbbench import registry
-from uwbbench.api.errors import ConfigError, nearest
+from uwbbench.api.errors import ConfigError, PluginError, nearest
 
 Folder = Literal["detectors", "experiments", "scenes"]
 
@@ -41,6 +41,8 @@ def find_config(folder: Folder, name: str, relative_to: Path | None = None) -> P
     ------
     ConfigError
         If there is no such file; names the nearest known name.
+    PluginError
+        If several packages bring a detector of that name.
     """
     if name.endswith((".yaml", ".yml")) or "/" in name or "\\" in name:
         tried = [(relative_to or Path()) / name]
@@ -51,9 +53,12 @@ def find_config(folder: Folder, name: str, relative_to: Path | None = None) -> P
                 return path
         raise ConfigError(f"{tried[0]}: no such file")
     known = shipped(folder)
+    others = registry.entries("detectors") if folder == "detectors" else {}
+    if name in known and name in others:
+        packages = f"uwbbench and {others[name].package}"
+        raise PluginError(f"detector '{name}' comes with several packages ({packages}); name its file instead")
     if name in known:
         return known[name]
-    others = registry.entries("detectors") if folder == "detectors" else {}
     if name in others:
         return registry.detector_file(name)
     raise ConfigError(f"no {folder[:-1]} named '{name}'.{nearest(name, [*known, *others])}")

@@ -35,6 +35,12 @@ for _tag, _pattern, _starts in (
     ),
 ):
     _Loader.add_implicit_resolver(f"tag:yaml.org,2002:{_tag}", re.compile(_pattern), list(_starts))
+_SCALARS = frozenset(f"tag:yaml.org,2002:{tag}" for tag in ("str", "bool", "null", "int", "float"))
+
+
+def _integer(text: str) -> int:
+    """Value of an integer; a leading zero does not make it octal, as it did in YAML 1.1."""
+    return int(text, 0) if text[:2] in ("0o", "0x") else int(text)
 
 
 @dataclass(frozen=True)
@@ -125,7 +131,17 @@ class _Builder:
             return [self.value(item, (*path, index)) for index, item in enumerate(node.value)]
         if isinstance(node, yaml.MappingNode):
             return self._mapping(node, path)
-        return self.loader.construct_object(node)
+        return self._scalar(node)
+
+    def _scalar(self, node: Any) -> Any:
+        line = node.start_mark.line + 1
+        if node.tag not in _SCALARS:
+            raise ConfigError(f"{self.name}:{line}: tag '{node.tag}' is not allowed; only plain values are")
+        try:
+            return _integer(node.value) if node.tag.endswith(":int") else self.loader.construct_object(node)
+        except (ValueError, KeyError) as error:
+            kind = node.tag.rpartition(":")[2]
+            raise ConfigError(f"{self.name}:{line}: '{node.value}' is not a valid {kind}") from error
 
     def _mapping(self, node: Any, path: Path_) -> dict[Any, Any]:
         found: dict[Any, Any] = {}
@@ -133,7 +149,7 @@ class _Builder:
             line = key_node.start_mark.line + 1
             if not isinstance(key_node, yaml.ScalarNode):
                 raise ConfigError(f"{self.name}:{line}: a key must be a single word or number")
-            key = self.loader.construct_object(key_node)
+            key = self._scalar(key_node)
             key = key_node.value if key is None or isinstance(key, bool | float) else key
             if key in found:
                 raise ConfigError(f"{self.name}:{line}: key '{dotted((*path, key))}' is given twice")
