@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from uwbbench.api.capture_file import open_capture, write_capture
-    from uwbbench.calibrate import calibrate
+    from uwbbench.calibration import calibrate
     from uwbbench.pipeline import load_detector
     from uwbbench.scoring import score
 
@@ -26,7 +26,7 @@ __all__ = ["__version__", "calibrate", "load_detector", "open_capture", "score",
 _HOME = {
     "open_capture": "uwbbench.api.capture_file",
     "write_capture": "uwbbench.api.capture_file",
-    "calibrate": "uwbbench.calibrate",
+    "calibrate": "uwbbench.calibration",
     "load_detector": "uwbbench.pipeline",
     "score": "uwbbench.scoring",
 }

@@ -71,6 +71,7 @@ class Stream:
         for index, opened in enumerate(self._stages):
             tail = opened.stage.flush()
             if tail is not None:
+                tail = _without_rows_of_invalid(tail)
                 if opened.label in self.chain:
                     self.chain[opened.label] += len(tail.detections)
                 out.append(self._emit(self._through(tail, index + 1)))
@@ -87,27 +88,26 @@ class Stream:
         return Detections.join(self._rejected)
 
     def _emit(self, block: Block) -> Detections:
-        found = block.detections
-        invalid = block.frames.index[~block.frames.valid]
-        if len(invalid) and len(found):
-            found = found.take(~np.isin(found.frame, invalid))
-        return found.annotated(processed=block.frames.index[block.frames.valid], notes=self.notes)
+        return block.detections.annotated(processed=block.frames.index[block.frames.valid], notes=self.notes)
 
     def _through(self, block: Block, start: int) -> Block:
-        rejected: list[Detections] = []
+        rejected: list[Block] = []
         for opened in self._stages[start:]:
             stage = opened.stage
             if self._audit and isinstance(stage, Filter):
                 keep = stage.keep(block)
-                rejected.append(block.detections.take(~keep))
+                rejected.append(block.replace(detections=block.detections.take(~keep)))
                 block = block.replace(detections=block.detections.take(keep))
             else:
-                if rejected and stage.rowwise:
-                    rejected = [stage.step(block.replace(detections=part)).detections for part in rejected]
+                if stage.rowwise:
+                    rejected = [stage.step(part) for part in rejected]
                 block = stage.step(block)
+                rejected = [_brought_along(part, block) for part in rejected]
+            if "detections" in stage.produces:
+                block = _without_rows_of_invalid(block)
             if "detections" in stage.produces or self.chain:
                 self.chain[opened.label] = self.chain.get(opened.label, 0) + len(block.detections)
-        self._rejected += rejected
+        self._rejected += [part.detections for part in rejected]
         return block
 
 
@@ -236,7 +236,9 @@ class Pipeline:
             module = sys.modules[registry.load("stages", step.use).__module__]
             content = Path(module.__file__).read_bytes() if module.__file__ else b""
             sources[step.use] = hashlib.sha256(content).hexdigest()
-        resolved = json.loads(json.dumps(self.config.to_dict()))  # channel numbers become text, which sorts with "other"
+        resolved = json.loads(
+            json.dumps(self.config.to_dict())
+        )  # channel numbers become text, which sorts with "other"
         text = json.dumps({"detector": resolved, "sources": sources}, sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()
 
@@ -258,6 +260,23 @@ def _without_invalid(frames: Frames) -> Frames:
         if samples is not None:
             parts[name] = np.where(frames.valid[:, None], samples, 0)
     return Frames(**{**{k: v for k, v in vars(frames).items() if k != "amplitude"}, **parts})
+
+
+def _without_rows_of_invalid(block: Block) -> Block:
+    """Block without detections of invalid frames, whatever a stage made of their zeros."""
+    frames, found = block.frames, block.detections
+    if frames.valid.all() or not len(found):
+        return block
+    return block.replace(detections=found.take(~np.isin(found.frame, frames.index[~frames.valid])))
+
+
+def _brought_along(part: Block, block: Block) -> Block:
+    """Rejected detections with what a stage has just added about their frames.
+
+    Behind a stage that holds frames back the block covers other frames; the part then keeps its own.
+    """
+    same = part.frames.first == block.frames.first and len(part.frames) == len(block.frames)
+    return block.replace(detections=part.detections) if same else part
 
 
 def load_detector(

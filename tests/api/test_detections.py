@@ -1,0 +1,71 @@
+"""The table of detections: absent columns, processed frames, joining."""
+
+import numpy as np
+import pytest
+
+from uwbbench.api import COLUMNS, Detections
+
+
+def test_a_column_that_nobody_computed_reads_as_nan():
+    found = Detections([0, 1], range_m=[1.0, 2.0])
+    assert "azimuth_rad" not in found
+    assert np.isnan(found.azimuth_rad).all()
+    assert found["range_m"].tolist() == [1.0, 2.0]
+
+
+def test_processed_and_empty_differs_from_not_processed():
+    assert Detections.empty(processed=[0, 1, 2]).processed.tolist() == [0, 1, 2]
+    assert Detections.empty().processed.tolist() == []
+
+
+def test_frames_with_a_detection_count_as_processed_where_nothing_else_is_said():
+    assert Detections([4, 4, 2]).processed.tolist() == [2, 4]
+
+
+def test_dropping_rows_keeps_the_processed_frames():
+    kept = Detections([0, 1], processed=[0, 1, 2]).take(np.array([False, True]))
+    assert (kept.frame.tolist(), kept.processed.tolist()) == ([1], [0, 1, 2])
+
+
+def test_joining_fills_what_one_part_lacks():
+    left = Detections([0], range_m=[1.0], cluster=[3], notes=["a"])
+    right = Detections([1], tap=[7.0], processed=[1, 2], notes=["a", "b"])
+    both = Detections.join([left, right])
+    np.testing.assert_array_equal(both["range_m"], [1.0, np.nan])
+    np.testing.assert_array_equal(both["tap"], [np.nan, 7.0])
+    assert both["cluster"].tolist() == [3, -1]
+    assert (both.processed.tolist(), both.notes) == ([0, 1, 2], ("a", "b"))
+
+
+def test_joining_nothing_is_empty():
+    assert len(Detections.join([])) == 0
+
+
+def test_columns_of_different_length_are_refused():
+    with pytest.raises(ValueError, match="differ in length"):
+        Detections([0, 1], range_m=[1.0])
+
+
+def test_changing_a_column_leaves_the_original_alone():
+    found = Detections([0], range_m=[1.0])
+    assert found.with_columns(range_m=[2.0]).range_m.tolist() == [2.0]
+    assert found.range_m.tolist() == [1.0]
+
+
+def test_candidates_are_found_once_and_only_when_asked_for():
+    calls = []
+    found = Detections([0], candidates=lambda: calls.append(1) or Detections([0, 0]))
+    assert calls == []
+    assert len(found.candidates) == len(found.candidates) == 2
+    assert calls == [1]
+
+
+def test_the_exported_table_has_every_column_in_order_and_the_plugins_own_behind():
+    table = Detections([0, 1], cluster=[-1, 2], flavour=[0.5, 0.6]).to_pandas()
+    assert tuple(table.columns) == (*COLUMNS, "flavour")
+    assert table["cluster"].tolist() == [-1, 2]
+    assert table["range_m"].isna().all()
+
+
+def test_a_table_without_clustering_has_missing_clusters_not_noise():
+    assert Detections([0]).to_pandas()["cluster"].isna().all()
