@@ -22,6 +22,7 @@ lint: $(VENV)/ready
 
 # The main job on built-in data: four detectors on two simulated approaches, a table, and a run folder to look into.
 demo: $(VENV)/ready
+	rm -rf demo
 	$(BIN)/uwbbench run configs/experiments/demo.yaml --out demo
 
 clean:

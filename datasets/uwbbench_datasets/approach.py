@@ -175,14 +175,16 @@ def _responses(
     tap_s = (np.arange(radar.taps) - crest_tap[:, None]) * radar.sample_interval_s
     gain = 10 ** (rng.normal(0, 0.5, frames) / 20) * np.exp(2j * np.pi * rng.uniform(size=frames))
     noise = direct * 10 ** (-DIRECT_SNR_DB / 20) / np.sqrt(2)
-    fixed = direct * _pulse(tap_s)
+    direct_path = direct * _pulse(tap_s)
+    direct_turn = slope * radar.baseline_m[1] / BASELINE_M
+    fixed = np.zeros(tap_s.shape, complex)
     for delay, amplitude in zip(ringing_s, ringing, strict=True):
         fixed = fixed + amplitude * _pulse(tap_s - delay)
     moving = (echo * echo_phase)[:, None] * _pulse(tap_s - delay_s[:, None])
     responses = []
     for antenna, loss_db in ((0, 0.0), (0, STS_LOSS_DB), (1, STS_LOSS_DB)):
         turned = moving * np.exp(1j * antenna * slope * np.sin(azimuth_rad))[:, None]
-        clean = gain[:, None] * (fixed + turned)
+        clean = gain[:, None] * (direct_path * np.exp(1j * antenna * direct_turn) + fixed + turned)
         white = rng.normal(size=clean.shape) + 1j * rng.normal(size=clean.shape)
         responses.append((clean + noise * 10 ** (loss_db / 20) * white).astype(np.complex64))
     return responses

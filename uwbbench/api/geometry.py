@@ -23,7 +23,8 @@ def wrap_angle(angle_rad: FloatArray) -> FloatArray:
     >>> wrap_angle(np.array([np.pi, -np.pi, 7.0])).round(6).tolist()
     [-3.141593, -3.141593, 0.716815]
     """
-    return np.asarray(np.mod(angle_rad + np.pi, 2 * np.pi) - np.pi)
+    wrapped = np.mod(angle_rad + np.pi, 2 * np.pi) - np.pi
+    return np.asarray(np.where(wrapped >= np.pi, -np.pi, wrapped))  # the modulo of a tiny negative number rounds up
 
 
 def rotate_z(vectors: FloatArray, yaw_rad: FloatArray | float) -> FloatArray:

@@ -1,0 +1,220 @@
+"""What ``show``, ``info`` and ``validate`` have to say, as plain values."""
+
+from __future__ import annotations
+
+import inspect
+from pathlib import Path
+from typing import Any
+
+from uwbbench import registry
+from uwbbench.api.errors import ConfigError, PluginError, nearest
+from uwbbench.config.locate import find_config, shipped
+
+_CLASSES = ("stages", "datasets", "metrics")
+
+
+def everything_named(name: str) -> dict[str, dict[str, Any]]:
+    """Facts about each kind of thing that bears a name.
+
+    Raises
+    ------
+    PluginError, ConfigError
+        If nothing bears it, or it cannot be loaded.
+    """
+    found: dict[str, dict[str, Any]] = {}
+    for kind in _CLASSES:
+        if name in registry.entries(kind):
+            found[kind[:-1]] = _plugin(kind, name)
+    is_file = name.endswith((".yaml", ".yml"))
+    if is_file or name in shipped("detectors") or name in registry.entries("detectors"):
+        found["detector"] = _detector(name)
+    if not found:
+        known = [*shipped("detectors"), *(known for kind in registry.KINDS for known in registry.entries(kind))]
+        raise PluginError(f"no stage, detector, dataset or metric named '{name}'.{nearest(name, known)}")
+    return found
+
+
+def _plugin(kind: Any, name: str) -> dict[str, Any]:
+    cls, entry = registry.load(kind, name), registry.entry(kind, name)
+    facts: dict[str, Any] = {"package": entry.package, "target": entry.target, "doc": inspect.getdoc(cls) or ""}
+    if kind == "stages":
+        facts["fidelity"] = cls.fidelity
+        facts |= {port: sorted(getattr(cls, port)) for port in ("consumes", "produces", "removes", "needs")}
+    elif kind == "datasets":
+        card = cls.card
+        facts |= {key: getattr(card, key) for key in ("title", "origin", "license", "citation", "source", "folder")}
+        facts["files"] = [{"path": file.path, "sha256": file.sha256, "url": file.url} for file in card.files]
+    else:
+        facts |= {key: getattr(cls, key) for key in ("unit", "better", "merge", "minimum_samples")}
+    if kind != "metrics":
+        facts["params"] = parameters(cls.params_type())
+    return facts
+
+
+def parameters(model: Any) -> list[dict[str, Any]]:
+    """Name, type, default and description of each parameter of a pydantic model."""
+    schema = model.model_json_schema()
+    rows = []
+    for name, field in schema.get("properties", {}).items():
+        required = name in schema.get("required", ())
+        default = "required" if required else _yaml_value(field.get("default", model.model_fields[name].default))
+        row = {"name": name, "type": _type_text(field, schema.get("$defs", {})), "default": default}
+        rows.append({**row, "description": field.get("description", "")})
+    return rows
+
+
+def _yaml_value(value: Any) -> str:
+    words = {None: "null", True: "true", False: "false"}
+    return words[value] if value is None or isinstance(value, bool) else str(value)
+
+
+def _type_text(field: dict[str, Any], definitions: dict[str, Any]) -> str:
+    """Type of a JSON Schema property in words.
+
+    Examples
+    --------
+    >>> _type_text({"type": "integer", "minimum": 1}, {})
+    'integer >= 1'
+    """
+    if "$ref" in field:
+        return _type_text(definitions[field["$ref"].rsplit("/", 1)[1]], definitions)
+    if "enum" in field:
+        return " | ".join(map(str, field["enum"]))
+    if "const" in field:
+        return str(field["const"])
+    if "anyOf" in field:
+        return " or ".join(_type_text(option, definitions) for option in field["anyOf"])
+    text = str(field.get("type", "any"))
+    if text == "array":
+        items = field.get("prefixItems") or [field.get("items", {})]
+        text = f"list of {' and '.join(dict.fromkeys(_type_text(item, definitions) for item in items))}"
+    signs = {"minimum": ">=", "exclusiveMinimum": ">", "maximum": "<=", "exclusiveMaximum": "<"}
+    limits = [f"{sign} {field[key]:g}" for key, sign in signs.items() if key in field]
+    return " ".join([text, ", ".join(limits)]).strip()
+
+
+def _detector(name: str) -> dict[str, Any]:
+    from uwbbench.pipeline import load_detector
+
+    config = load_detector(name).config
+    about = {"description": config.description, "citation": config.citation, **config.to_dict()}
+    return {"file": str(find_config("detectors", name)), **about}
+
+
+def detector_yaml(facts: dict[str, Any]) -> str:
+    """Detector as a YAML file that could be loaded again, its origin in a comment."""
+    import yaml
+
+    order = ("schema", "name", "description", "citation", "fidelity")
+    head = {key: facts[key] for key in order if facts[key]}
+    text = yaml.safe_dump(head, sort_keys=False, allow_unicode=True, width=110) + "pipeline:\n"
+    for step in facts["pipeline"]:
+        line = yaml.safe_dump(_without_defaults(step), sort_keys=False, default_flow_style=True, width=10_000)
+        text += f"  - {line}"
+    return f"# resolved from {facts['file']}\n{text}"
+
+
+def _without_defaults(step: dict[str, Any]) -> dict[str, Any]:
+    kept = {"use": step["use"]}
+    if step["as"] != step["use"]:
+        kept["as"] = step["as"]
+    return kept | {key: step[key] for key in ("params", "optional") if step[key]}
+
+
+def capture_file(path: Path) -> dict[str, Any]:
+    """Facts about every receiver of a capture file; all samples are read once, to count invalid frames."""
+    from uwbbench.api.capture_file import list_receivers, open_capture
+    from uwbbench.store.identity import plain
+
+    captures = [open_capture(path, name) for name in list_receivers(path)]
+    first = captures[0]
+    radar = first.radar.to_dict()
+    common = (
+        "model",
+        "channel",
+        "center_frequency_hz",
+        "bandwidth_hz",
+        "sample_interval_s",
+        "frame_rate_hz",
+        "samples",
+    )
+    channel = f"channel {first.radar.channel}, " if first.radar.channel else ""
+    text = (
+        f"{first.radar.model}, {channel}{first.radar.center_frequency_hz / 1e6:.1f} MHz, "
+        f"bandwidth {first.radar.bandwidth_hz / 1e6:.1f} MHz, {first.radar.samples} samples "
+        f"every {first.radar.sample_interval_s * 1e9:.4f} ns, {first.radar.frame_rate_hz:g} frames/s"
+    )
+    truth = None
+    if first.truth is not None:
+        keys = ("name", "material", "structure", "moves")
+        objects = [{key: getattr(thing, key) for key in keys} for thing in first.truth.objects]
+        truth = {"exhaustive": first.truth.exhaustive, "objects": objects}
+    about = {key: getattr(first, key) for key in ("name", "source", "license", "citation", "description")}
+    found = {
+        **about,
+        "file": str(path),
+        "radar": {**{key: radar[key] for key in common}, "text": text},
+        "receivers": [_receiver(capture) for capture in captures],
+        "truth": truth,
+    }
+    return dict(plain(found))
+
+
+def _receiver(capture: Any) -> dict[str, Any]:
+    radar = capture.radar
+    invalid = sum(int((~frames.valid).sum()) for frames in capture.blocks(4096))
+    return {
+        "receiver": radar.receiver,
+        "frames": len(capture),
+        "taps": radar.taps,
+        "duration_s": capture.duration_s,
+        "invalid_frames": invalid,
+        "sts": radar.has_sts,
+        "first_path": radar.has_first_path,
+        "noise_taps": radar.noise_taps,
+        "window_m": radar.window_m,
+        "baseline_m": radar.baseline_length_m,
+        "mount_position_m": radar.mount_position_m,
+        "mount_yaw_rad": radar.mount_yaw_rad,
+        "array_spacing_m": radar.array_spacing_m,
+        "first_tap_delay_s": radar.first_tap_delay_s,
+    }
+
+
+def receiver_text(receiver: dict[str, Any]) -> dict[str, str]:
+    """One receiver's row of a table, numbers with units."""
+    return {
+        "receiver": receiver["receiver"],
+        "frames": str(receiver["frames"]),
+        "taps": str(receiver["taps"]),
+        "duration": f"{receiver['duration_s']:.2f} s",
+        "invalid frames": str(receiver["invalid_frames"]),
+        "STS": "yes" if receiver["sts"] else "no",
+        "first path": "reported" if receiver["first_path"] else "not reported",
+        "range window": f"{receiver['window_m']:.2f} m",
+        "TX to RX": f"{receiver['baseline_m']:.3f} m",
+    }
+
+
+def checked_file(path: Path) -> str:
+    """Summary of a detector or experiment file that passed all checks.
+
+    Raises
+    ------
+    ConfigError, PluginError
+        If it is wrong, or neither of the two.
+    """
+    from uwbbench.config.experiment import read_experiment
+    from uwbbench.config.yaml_file import read_yaml
+    from uwbbench.pipeline import load_detector
+
+    keys = read_yaml(path).data
+    if "pipeline" in keys or "extends" in keys:
+        pipeline = load_detector(path if path.is_absolute() else Path.cwd() / path)
+        return f"detector '{pipeline.name}', {len(pipeline.config.steps)} steps, fine"
+    if "detectors" in keys or "datasets" in keys:
+        experiment = read_experiment(path)
+        return f"experiment '{experiment.name}', {len(experiment.detectors)} detectors, fine"
+    near = [nearest(str(key), ["pipeline", "extends", "detectors", "datasets"]) for key in keys]
+    hint = next((text for text in near if text.startswith(" Did")), "")
+    raise ConfigError(f"{path}: neither a detector ('pipeline' or 'extends') nor an experiment ('detectors').{hint}")

@@ -1,0 +1,149 @@
+"""Commands that put one detector on one capture: ``score``, ``detect``, ``calibrate``."""
+
+from __future__ import annotations
+
+import math
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from uwbbench.api.errors import ScoringError
+from uwbbench.cli import options, render
+
+if TYPE_CHECKING:
+    from uwbbench.api.capture import Capture
+    from uwbbench.pipeline import Pipeline
+
+
+def score(
+    capture: options.CaptureFile,
+    detector: options.Detector,
+    scoring: Annotated[options.Scoring, typer.Option(help="How detections are counted.")] = options.Scoring.FRAME,
+    gate_m: Annotated[float, typer.Option(metavar="METRES", help="Largest error of a true detection.")] = 0.20,
+    receiver: options.Receiver = None,
+    settings: options.Settings = None,
+    latency: Annotated[bool, typer.Option("--latency/--no-latency", help="Measure the time a frame takes.")] = True,
+    json: options.Json = False,
+) -> None:
+    """Score a detector on a capture with ground truth, and time it."""
+    import uwbbench
+    from uwbbench.scoring import ScoringRules
+    from uwbbench.store.identity import plain
+
+    ScoringRules(scoring.value, gate_m)  # a wrong gate is found before the detector has run
+    opened, pipeline = _open(capture, receiver, detector, settings)
+    if opened.truth is None:
+        raise ScoringError(f"{capture}: the capture has no ground truth; it can be detected on, but not scored")
+    found = pipeline.run(opened, candidates=scoring is options.Scoring.PEAK)
+    tables = uwbbench.score(found, opened, scoring=scoring.value, gate_m=gate_m).to_dict()
+    result = {
+        "detector": pipeline.name,
+        "capture": opened.name,
+        "frames": len(opened),
+        "filtering": tables["filtering"],
+        "mapping": tables["mapping"],
+        "latency_us": _latency_us(capture, opened, pipeline) if latency and len(opened) else None,
+        "scoring": tables["scoring"],
+        "gate_m": tables["gate_m"],
+        "receiver": opened.radar.receiver,
+        "source": opened.source,
+        "notes": list(found.notes),
+    }
+    if json:
+        render.print_json(plain(result))
+    else:
+        render.print_scores(result)
+
+
+def _latency_us(path: Path, opened: Capture, pipeline: Pipeline) -> dict[str, Any]:
+    """Times in microseconds, measured in a fresh process, and the number of calls behind them."""
+    from uwbbench.config.experiment import LatencyModel
+    from uwbbench.config.source import CaptureRef
+    from uwbbench.timing import measure
+
+    receiver = opened.radar.receiver if len(opened.receivers) > 1 else None
+    measured = measure(
+        CaptureRef.of_file(path, receiver), pipeline.config, LatencyModel.model_validate({"reference": None})
+    ).to_dict()
+    times = {key.removesuffix("_us"): value for key, value in measured.items() if key.endswith("_us")}
+    return {"n": measured["n"], **times}
+
+
+def _open(path: Path, receiver: str | None, detector: str, settings: list[str] | None) -> tuple[Capture, Pipeline]:
+    import uwbbench
+    from uwbbench.config.override import parse_settings
+
+    pipeline = uwbbench.load_detector(detector, changes=parse_settings(settings or ()))
+    return uwbbench.open_capture(path, receiver), pipeline
+
+
+def detect(
+    capture: options.CaptureFile,
+    detector: options.Detector,
+    output: Annotated[Path, typer.Option("--output", "-o", metavar="FILE", help="Table to write: .csv or .parquet.")],
+    receiver: options.Receiver = None,
+    settings: options.Settings = None,
+) -> None:
+    """Write what a detector finds on a capture. No ground truth is needed."""
+    from uwbbench.store.files import replacing
+
+    suffix = options.format_of(output, ".csv", ".parquet")
+    opened, pipeline = _open(capture, receiver, detector, settings)
+    found = pipeline.run(opened)
+    table = found.to_pandas()
+    with replacing(output) as partial:
+        if suffix == ".csv":
+            table.to_csv(partial, index=False)
+        else:
+            table.to_parquet(partial, index=False)
+    label = "SIMULATED capture" if opened.source == "simulated" else "capture"
+    counts = f"{len(found)} detections in {len(found.processed)} of {len(opened)} frames"
+    typer.echo(f"{pipeline.name} on {label} '{opened.name}': {counts}, written to {output}", err=True)
+    render.print_notes(found.notes)
+
+
+def calibrate(
+    capture: options.CaptureFile,
+    detector: options.Detector,
+    output: Annotated[Path, typer.Option("--output", "-o", metavar="FILE.yaml", help="Detector file to write.")],
+    receiver: options.Receiver = None,
+    settings: options.Settings = None,
+) -> None:
+    """Write a detector corrected for its own offsets.
+
+    The offsets of range and azimuth are measured on a capture whose truth is known.
+    """
+    import yaml
+
+    import uwbbench
+    from uwbbench.config.override import parse_settings
+    from uwbbench.store.files import write_text
+
+    options.format_of(output, ".yaml", ".yml")
+    opened, pipeline = _open(capture, receiver, detector, settings)
+    measured = uwbbench.calibrate(pipeline, opened)
+    name = f"{pipeline.name}-calibrated"
+    changes = parse_settings(settings or ()) | measured.as_settings()
+    head = {"schema": 1, "extends": _seen_from(output.parent, detector), "name": name, "set": changes}
+    label = "SIMULATED capture" if opened.source == "simulated" else "capture"
+    found = f"range offset {measured.range_bias_m:+.4f} m"
+    if measured.azimuth_bias_rad is not None:
+        found += f", azimuth offset {math.degrees(measured.azimuth_bias_rad):+.2f} degrees"
+    origin = f"measured on {label} '{opened.name}' from {measured.n} detections: {found}"
+    write_text(output, f"# {origin}\n{yaml.safe_dump(head, sort_keys=False, allow_unicode=True)}")
+    typer.echo(f"{origin}; detector '{name}' written to {output}", err=True)
+
+
+def _seen_from(folder: Path, detector: str) -> str:
+    """Detector as a file in another folder must name it."""
+    is_name = not detector.endswith((".yaml", ".yml"))
+    return detector if is_name else os.path.relpath(detector, folder)
+
+
+def register(app: typer.Typer) -> None:
+    """Add these commands."""
+    app.command(epilog="Example: uwbbench score run.h5 --detector paper --scoring object --json")(score)
+    app.command(epilog="Example: uwbbench detect run.h5 --detector cfar-os -o found.csv")(detect)
+    app.command(epilog="Example: uwbbench calibrate run.h5 --detector paper -o calibrated.yaml")(calibrate)

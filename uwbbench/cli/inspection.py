@@ -1,0 +1,178 @@
+"""Commands that look and change nothing: ``list``, ``show``, ``info``, ``validate``, ``schema``, ``version``."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+import uwbbench
+from uwbbench import registry
+from uwbbench.api.errors import UwbbenchError
+from uwbbench.cli import describe, options, render
+from uwbbench.config.locate import shipped
+
+USAGE_ERROR = 2
+
+
+class Kind(StrEnum):
+    """What can be listed."""
+
+    STAGES = "stages"
+    DETECTORS = "detectors"
+    DATASETS = "datasets"
+    METRICS = "metrics"
+
+
+class File(StrEnum):
+    """Files that have a schema."""
+
+    DETECTOR = "detector"
+    EXPERIMENT = "experiment"
+
+
+def list_names(
+    kind: Annotated[Kind | None, typer.Argument(help="Only this kind.", show_default=False)] = None,
+    json: options.Json = False,
+) -> None:
+    """List what is installed. Nothing of it is loaded."""
+    found = {name: _listed(name) for name in ([kind.value] if kind else registry.KINDS)}
+    if json:
+        render.print_json(found)
+        return
+    for name, rows in found.items():
+        problems = ["problem"] if any(row["problem"] for row in rows) else []
+        shown = ["name", "package", "target", *problems]
+        render.print_table(name, shown, [[row[column] for column in shown] for row in rows])
+
+
+def _listed(kind: Any) -> list[dict[str, str]]:
+    files = shipped("detectors") if kind == "detectors" else {}
+    own = {"package": f"uwbbench {uwbbench.__version__}", "problem": ""}
+    rows = [{"name": name, "target": str(path), **own} for name, path in files.items()]
+    for entry in registry.entries(kind).values():
+        rivals = [*entry.rivals, *([own["package"]] if entry.name in files else [])]
+        problem = f"unusable: also in {', '.join(rivals)}" if rivals else ""
+        rows.append({"name": entry.name, "package": entry.package, "target": entry.target, "problem": problem})
+    return rows
+
+
+def show(
+    name: Annotated[str, typer.Argument(help="Stage, detector, dataset or metric; or a detector file.")],
+    json: options.Json = False,
+) -> None:
+    """Explain a plugin, or print a detector as YAML."""
+    found = describe.everything_named(name)
+    if json:
+        render.print_json(found)
+        return
+    for kind, facts in found.items():
+        if kind == "detector":
+            typer.echo(describe.detector_yaml(facts), nl=False)
+            continue
+        typer.echo(f"{kind} {name}  ({facts.pop('package')}, {facts.pop('target')})\n\n{facts.pop('doc')}\n")
+        params = facts.pop("params", [])
+        files = facts.pop("files", [])
+        render.print_facts({key: ", ".join(v) if isinstance(v, list) else v for key, v in facts.items()})
+        if params:
+            typer.echo()
+            columns = ("name", "type", "default", "description")
+            render.print_table("parameters", columns, [[row[key] for key in columns] for row in params])
+        if files:
+            render.print_table("files", ("path", "sha256"), [(file["path"], file["sha256"]) for file in files])
+
+
+def info(capture: options.CaptureFile, json: options.Json = False) -> None:
+    """Tell what a capture file holds."""
+    found = describe.capture_file(capture)
+    if json:
+        render.print_json(found)
+        return
+    label = "SIMULATED" if found["source"] == "simulated" else found["source"]
+    about = {key: found[key] for key in ("name", "description", "license", "citation")}
+    render.print_facts({"capture": about.pop("name"), "source": label, **about, "radar": found["radar"]["text"]})
+    rows = []
+    for receiver in found["receivers"]:
+        facts = describe.receiver_text(receiver)
+        rows.append(list(facts.values()))
+    render.print_table("receivers", list(facts), rows)
+    truth = found["truth"]
+    if truth is None:
+        typer.echo("no ground truth: detectors can run on it, but it cannot be scored")
+        return
+    coverage = "exhaustive" if truth["exhaustive"] else "not exhaustive: unmatched detections prove nothing"
+    typer.echo(f"ground truth ({coverage})")
+    objects = [(t["name"], t["material"], _object_text(t)) for t in truth["objects"]]
+    render.print_table("objects", ("name", "material", "kind"), objects)
+
+
+def _object_text(thing: dict[str, Any]) -> str:
+    what = "structure" if thing["structure"] else "obstacle"
+    return f"moving {what}" if thing["moves"] else what
+
+
+def validate(
+    files: Annotated[list[Path], typer.Argument(metavar="FILE...", help="Detector or experiment YAML.")],
+) -> None:
+    """Check detector and experiment files. Mistakes are named with file, line and key."""
+    wrong = False
+    for path in files:
+        try:
+            typer.echo(f"{path}: {describe.checked_file(path)}")
+        except UwbbenchError as error:
+            wrong = True
+            text = str(error)
+            typer.echo(text if text.startswith(str(path)) else f"{path}: {text}", err=True)
+    if wrong:
+        raise typer.Exit(USAGE_ERROR)
+
+
+def schema(
+    file: Annotated[File, typer.Argument(help="Kind of file.")] = File.DETECTOR,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", metavar="FILE.json", help="Write here.", show_default=False)
+    ] = None,
+) -> None:
+    """Print a JSON Schema of such a file, for editors."""
+    from uwbbench.config.schema import detector_schema, experiment_schema
+
+    made = detector_schema() if file is File.DETECTOR else experiment_schema()
+    if output is None:
+        render.print_json(made)
+        return
+    options.format_of(output, ".json")
+    from uwbbench.store.files import write_json
+
+    write_json(output, made)
+    typer.echo(f"{file.value} schema written to {output}")
+
+
+def version(json: options.Json = False) -> None:
+    """Print versions. Results depend on all of them."""
+    import platform
+    from importlib.metadata import PackageNotFoundError
+    from importlib.metadata import version as installed
+
+    found = {"uwbbench": uwbbench.__version__, "python": platform.python_version(), "platform": platform.platform()}
+    for name in ("numpy", "scipy", "scikit-learn", "pandas", "h5py", "pyarrow"):
+        try:
+            found[name] = installed(name)
+        except PackageNotFoundError:
+            found[name] = "not installed"
+    if json:
+        render.print_json(found)
+    else:
+        for name, text in found.items():
+            typer.echo(f"{name} {text}")
+
+
+def register(app: typer.Typer) -> None:
+    """Add these commands."""
+    app.command("list", epilog="Example: uwbbench list stages")(list_names)
+    app.command(epilog="Example: uwbbench show filter.prominence")(show)
+    app.command(epilog="Example: uwbbench info run.h5")(info)
+    app.command(epilog="Example: uwbbench validate mine.yaml")(validate)
+    app.command(epilog="Example: uwbbench schema detector -o detector.schema.json")(schema)
+    app.command(epilog="Example: uwbbench version --json")(version)

@@ -1,0 +1,148 @@
+"""Commands about whole experiments: ``run``, ``report``, ``rescore``."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from uwbbench.api.errors import ConfigError
+from uwbbench.cli import options, render
+
+if TYPE_CHECKING:
+    from uwbbench.run import Progress
+    from uwbbench.store import RunFolder
+
+UNITS_FAILED, INTERRUPTED = 3, 130
+
+RunPath = Annotated[Path, typer.Argument(metavar="RUN", help="Run folder.", show_default=False)]
+
+
+def run(
+    experiment: Annotated[str, typer.Argument(metavar="EXPERIMENT", help="Experiment: a YAML file or a shipped name.")],
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="New run folder; runs/NAME-TIME if left out.", show_default=False),
+    ] = None,
+    data_dir: options.DataDir = None,
+    jobs: Annotated[
+        int | None, typer.Option(min=1, metavar="N", help="Processes; all cores if left out.", show_default=False)
+    ] = None,
+    resume: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Run folder to continue instead.", show_default=False)
+    ] = None,
+    settings: options.Settings = None,
+    json: options.Json = False,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress on the terminal.")] = False,
+) -> None:
+    """Run an experiment: every detector on every capture.
+
+    Prints a leaderboard and leaves a run folder. A detector or capture that fails is a row with its reason; the exit
+    code is then 3.
+    """
+    from uwbbench.config.experiment import read_experiment
+    from uwbbench.config.override import parse_settings
+    from uwbbench.run import Interrupted, run_experiment
+
+    if out is not None and resume is not None:
+        raise ConfigError("--out makes a new run folder and --resume continues one; give one of them")
+    plan = read_experiment(experiment, parse_settings(settings or ()), data_dir)
+    try:
+        with _progress_bar(quiet) as advance:
+            folder = run_experiment(plan, resume or out, jobs=jobs, resume=resume is not None, progress=advance)
+    except Interrupted as stop:
+        typer.echo(str(stop), err=True)
+        raise typer.Exit(INTERRUPTED) from stop
+    _conclude(folder, json=json)
+    if any(entry.status == "failed" for entry in folder.entries()):
+        raise typer.Exit(UNITS_FAILED)
+
+
+@contextmanager
+def _progress_bar(quiet: bool) -> Iterator[Callable[[Progress], None] | None]:
+    """Progress on stderr where that is a terminal, else nothing."""
+    if quiet or not sys.stderr.isatty():
+        yield None
+        return
+    from rich.console import Console
+    from rich.markup import escape
+    from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
+    from rich.progress import Progress as Bar
+
+    columns = (BarColumn(), MofNCompleteColumn(), TimeRemainingColumn(), TextColumn("{task.description}"))
+    with Bar(*columns, console=Console(stderr=True)) as bar:
+        task = bar.add_task("starting", total=None)
+        failures = 0
+
+        def advance(progress: Progress) -> None:
+            nonlocal failures
+            failures += progress.entry.status == "failed"
+            failed = f"{failures} failed, " if failures else ""
+            now = escape(f"{progress.entry.kind}: {progress.entry.detector} on {progress.entry.capture}")
+            bar.update(task, completed=progress.done, total=progress.total, description=f"{failed}{now}")
+
+        yield advance
+
+
+def report(run: RunPath, json: options.Json = False) -> None:
+    """Print all tables of a run again. Nothing is run."""
+    from uwbbench.report import Report
+    from uwbbench.store import RunFolder
+    from uwbbench.store.identity import plain
+
+    made = Report(RunFolder(run))
+    if json:
+        render.print_json(plain(made.to_dict()))
+    else:
+        render.print_report(made)
+
+
+def rescore(
+    run: RunPath,
+    scoring: Annotated[
+        list[options.Scoring] | None,
+        typer.Option(help="Scoring; may be repeated. As before if left out.", show_default=False),
+    ] = None,
+    gate_m: Annotated[
+        float | None,
+        typer.Option(metavar="METRES", help="Largest error of a true detection. As before if left out."),
+    ] = None,
+    json: options.Json = False,
+) -> None:
+    """Score a run again by other rules. Nothing is run: the stored detections are judged anew."""
+    from dataclasses import replace
+
+    from uwbbench.run import rescore as score_again
+    from uwbbench.store import RunFolder
+
+    folder = RunFolder(run)
+    before = folder.rules
+    chosen = scoring or [options.Scoring(rules.scoring) for rules in before]
+    gate = before[0].gate_m if gate_m is None else gate_m
+    score_again(folder, [replace(before[0], scoring=one.value, gate_m=gate) for one in dict.fromkeys(chosen)])
+    _conclude(folder, json=json)
+
+
+def _conclude(folder: RunFolder, *, json: bool) -> None:
+    """Write the report into the run folder, and show its leaderboard."""
+    from uwbbench.report import Report, write_report
+    from uwbbench.store.identity import plain
+
+    path = write_report(folder)
+    made = Report(folder)
+    if json:
+        render.print_json(plain(made.to_dict()))
+        return
+    render.print_leaderboard(made)
+    typer.echo(f"run folder: {folder.path} (all tables: {path}, or 'uwbbench report {folder.path}')")
+
+
+def register(app: typer.Typer) -> None:
+    """Add these commands."""
+    app.command(epilog="Example: uwbbench run configs/experiments/demo.yaml --out demo")(run)
+    app.command(epilog="Example: uwbbench report demo --json")(report)
+    app.command(epilog="Example: uwbbench rescore demo --scoring object --gate-m 0.1")(rescore)
