@@ -1,0 +1,172 @@
+"""A report as tables of text, as Markdown, and as a file in its run folder."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from uwbbench.report.report import STANDARD, Report
+from uwbbench.report.sheet import Sheet, escaped, interval, number, shown
+from uwbbench.stats import MINIMUM_GROUPS
+from uwbbench.store.folder import RunFolder
+
+_TITLES = {
+    "precision": "precision",
+    "recall": "recall",
+    "f1": "F1",
+    "mae": "MAE",
+    "matched_mae": "MAE of matches",
+    "p90": "P90",
+    "p95": "P95",
+    "sd": "SD",
+    "false_alarms_per_minute": "false alarms",
+}
+_TABLES = {"filtering": "after filtering (range)", "mapping": "after mapping (position)"}
+
+
+def sheets(report: Report) -> list[Sheet]:
+    """All tables of a report: leaderboards, the paper's tables, times, and what did not work."""
+    found = [*_leaderboards(report), *_paper_tables(report)]
+    if not report.latency.empty:
+        found.append(_latency(report))
+    if report.failures:
+        failed = tuple(
+            (str(e.kind), shown(e.detector), shown(e.dataset), shown(e.capture), _line(e.reason))
+            for e in report.failures
+        )
+        found.append(Sheet("Failed", ("what", "detector", "dataset", "capture", "reason"), failed))
+    if report.unscored:
+        rows = tuple(
+            (shown(e.detector), shown(e.capture), scoring, _line(reason)) for e, scoring, reason in report.unscored
+        )
+        found.append(Sheet("Not scored", ("detector", "capture", "scoring", "reason"), rows))
+    return found
+
+
+def markdown(report: Report) -> str:
+    """Whole report as Markdown."""
+    name, about = report.experiment["name"], report.experiment["description"]
+    lines = [f"# {escaped(shown(name))}", ""]
+    if about:
+        lines += [escaped(" ".join(about.split())), ""]
+    lines += [sheet.markdown() for sheet in sheets(report)]
+    if report.notes:
+        lines += ["## Notes", "", *(f"* {escaped(_line(note))}" for note in report.notes), ""]
+    session = report.folder.manifest["sessions"][-1]
+    machine, versions = session["machine"], session["versions"]
+    made = f"uwbbench {versions['uwbbench']}, Python {versions['python']}, {machine['cpu']}, {machine['os']}"
+    lines += [f"Made with {escaped(made)}; started {session['started']}."]
+    return "\n".join(lines) + "\n"
+
+
+def write_report(folder: RunFolder) -> Path:
+    """Write ``report.md`` into a run folder."""
+    return folder.write_text("report.md", markdown(Report(folder)))
+
+
+def _line(text: str) -> str:
+    return " ".join(text.split())
+
+
+def _scale(unit: str) -> tuple[str, int, float]:
+    """How a metric's unit is shown: its name, digits, and the factor to it."""
+    if unit == "m":
+        return " (cm)", 1, 100.0
+    return (f" ({unit})", 2, 1.0) if unit else ("", 3, 1.0)
+
+
+def _leaderboards(report: Report) -> Iterator[Sheet]:
+    """One sheet for each dataset, source, scoring and table."""
+    units = {name: metric.unit for name, metric in report.metrics.items()} | {"matched_mae": "m"}
+    groups: dict[tuple[str, ...], list[tuple[dict[str, Any], Any]]] = {}
+    for about, found in report.estimates:
+        key = about["dataset"], about["source"], about["scoring"], about["table"]
+        groups.setdefault(key, []).append((about, found))
+    for (dataset, source, scoring, table), members in groups.items():
+        open_world = any(not about["exhaustive"] for about, _ in members)
+        hidden = ("precision", "f1", "false_alarms_per_minute") if open_world else ()
+        names = [name for name in members[0][1] if name not in hidden]
+        heads = [_TITLES.get(name, name) + _scale(units[name])[0] for name in names]
+        extra = (["chance recall"] if open_world else []) + ["n", "frames", "p50 (us)", "p99 (us)"]
+        rows = []
+        for about, found in members:
+            cells = [
+                interval(e.value, e.low, e.high, *_scale(units[name])[1:]) for name in names for e in [found[name]]
+            ]
+            cells += [number(about["chance_recall"], 3)] if open_world else []
+            frames = f"{about['scored_frames']} of {about['frames']}"
+            cells += [str(found["mae"].n), frames, number(about["p50_us"], 0), number(about["p99_us"], 0)]
+            rows.append((shown(about["detector"]), *cells))
+        title = f"{shown(dataset)}, {source.upper()}: {scoring} scoring, {_TABLES[table]}"
+        yield Sheet(title, ("detector", *heads, *extra), tuple(rows), tuple(_leaderboard_notes(members, open_world)))
+
+
+def _leaderboard_notes(members: list[tuple[dict[str, Any], Any]], open_world: bool) -> Iterator[str]:
+    yield "Errors are those of all retained detections; 'of matches' counts true positives only: read it with recall."
+    if open_world:
+        yield (
+            "The truth does not name all that is visible, so an unmatched detection proves nothing: precision and F1 "
+            "are undefined; errors are of matches, and recall is to be read against that of random ranges."
+        )
+    if all(estimate["recall"].groups < MINIMUM_GROUPS for _, estimate in members):
+        yield f"No intervals: fewer than {MINIMUM_GROUPS} groups (captures, or blocks of a second)."
+        for about, found in members:
+            values = ", ".join(number(value, 3) for value in found["recall"].per_group)
+            yield f"Recall of each group, {shown(about['detector'])}: {values or 'none'}"
+    for about, _ in members:
+        if about["invalid"] or about["unprocessed"]:
+            yield (
+                f"{shown(about['detector'])}: {about['invalid']} frames invalid or not processed, "
+                f"{about['unprocessed']} of them with known truth"
+            )
+    yield "Times hold on this machine only."
+
+
+def _paper_tables(report: Report) -> Iterator[Sheet]:
+    table = report.paper_tables
+    if table.empty:
+        return
+    names = ("mae", "p90", "p95", "sd", "precision", "recall", "f1")
+    units = {name: _scale(report.metrics[name].unit) for name in STANDARD}
+    heads = tuple(_TITLES[name] + units[name][0] for name in names)
+    for kind in table["table"].unique():
+        rows = [
+            (
+                shown(row["detector"]),
+                row["scoring"],
+                shown(row["dataset"]),
+                number(row["channel"], 0),
+                shown(row["material"]),
+                row["source"],
+                *(number(row[name], *units[name][1:]) for name in names),
+            )
+            for row in table[table["table"] == kind].to_dict("records")
+        ]
+        columns = ("detector", "scoring", "dataset", "channel", "material", "source", *heads)
+        yield Sheet(f"By channel and material, {_TABLES[kind]}", columns, tuple(rows))
+
+
+def _latency(report: Report) -> Sheet:
+    times = ("p50_us", "p90_us", "p95_us", "p99_us", "max_us", "clustering_p50_us", "amortised_us", "throughput_us")
+    heads = ("p50", "p90", "p95", "p99", "max", "clustering call", "amortised", "batch a frame")
+    table = report.latency
+    rows = []
+    for row in table.to_dict("records"):
+        cells = [shown(row["detector"]), shown(row["capture"]), *(number(row[name], 1) for name in times)]
+        cells += [interval(row["ratio"], row["ratio_low"], row["ratio_high"], 3), number(row["missed_share"], 2, 100.0)]
+        cells += [str(row["longest_burst"]), number(row["startup_s"], 2), number(row["peak_memory_bytes"], 0, 1e-6)]
+        rows.append((*cells, number(row["overhead_us"], 1), str(row["n"])))
+    references = ", ".join(sorted({name for name in table["reference"] if isinstance(name, str)})) or "none"
+    columns = ("detector", "capture", *(f"{head} (us)" for head in heads), "ratio to reference", "missed (%)")
+    columns += ("longest burst", "start-up (s)", "memory (MB)", "harness (us)", "calls")
+    notes = (
+        "THIS MACHINE ONLY: times in us of single calls, one frame each, on one core with one thread.",
+        f"What travels is the ratio to a reference detector ({references}), measured in alternating blocks.",
+        "n/a: too few calls for that percentile (36, 72 and 368 for P90, P95 and P99), or not told by the detector.",
+        "harness: the same loop with a detector that does nothing.",
+    )
+    told = dict.fromkeys(
+        f"{shown(row['detector'])}: {row['notes']}" for row in table.to_dict("records") if row["notes"]
+    )
+    return Sheet("Latency", columns, tuple(rows), (*notes, *told))

@@ -1,0 +1,41 @@
+"""What a run depends on besides its configuration: versions, machine, command."""
+
+from __future__ import annotations
+
+import platform
+import sys
+from datetime import UTC, datetime
+from importlib.metadata import PackageNotFoundError, version
+from typing import Any
+
+from uwbbench import __version__, registry
+from uwbbench.timing.machine import machine
+
+_PACKAGES = ("numpy", "scipy", "scikit-learn", "joblib", "pyarrow", "pandas", "h5py", "pydantic")
+
+
+def versions() -> dict[str, str]:
+    """Versions of Python, uwbbench, the libraries under it, and every package that registers a plugin."""
+    found = {"python": platform.python_version(), "uwbbench": __version__}
+    for name in _PACKAGES:
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            found[name] = "not installed"
+    for kind in registry.KINDS:
+        for entry in registry.entries(kind).values():
+            name, _, number = entry.package.rpartition(" ")
+            found.setdefault(name, number)
+    return found
+
+
+def session(jobs: int) -> dict[str, Any]:
+    """One call of the program that worked on a run."""
+    return {
+        "started": datetime.now(UTC).isoformat(timespec="seconds"),
+        "command": list(sys.argv),
+        "jobs": jobs,
+        "threads_per_job": 1,
+        "versions": versions(),
+        "machine": machine(),
+    }

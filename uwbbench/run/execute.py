@@ -1,0 +1,266 @@
+"""Carrying out a plan: accuracy in parallel, latency one by one, every finished unit on disk at once."""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+import time
+import traceback
+import uuid
+from collections.abc import Callable, Iterator
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import suppress
+from dataclasses import dataclass
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+from joblib import Parallel, delayed
+
+from uwbbench.api.errors import StoreError, UwbbenchError
+from uwbbench.config.experiment import Experiment
+from uwbbench.pipeline import Pipeline
+from uwbbench.run import environment
+from uwbbench.run.plan import Plan, Unit, plan, reason_of, rules_of
+from uwbbench.run.scored import table_of
+from uwbbench.run.unit import Finished, Job, content_of, entry_of, identity_of, run_unit
+from uwbbench.store.folder import RunFolder
+from uwbbench.store.identity import canonical, plain
+from uwbbench.store.journal import Entry
+from uwbbench.timing.machine import machine, usable_cores
+
+
+class Interrupted(UwbbenchError):
+    """A run was stopped by the user; all finished units are stored.
+
+    Parameters
+    ----------
+    folder : Path
+        Its run folder.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        super().__init__(f"interrupted; what was finished is in {folder}; continue with --resume {folder}")
+        self.folder = folder
+
+
+@dataclass(frozen=True)
+class Progress:
+    """How far a run is.
+
+    Attributes
+    ----------
+    done, total : int
+        Units, those of an earlier session included.
+    entry : Entry
+        The unit that has just finished.
+    """
+
+    done: int
+    total: int
+    entry: Entry
+
+
+def run_experiment(
+    experiment: Experiment,
+    out: Path | None = None,
+    *,
+    jobs: int | None = None,
+    resume: bool = False,
+    progress: Callable[[Progress], None] | None = None,
+) -> RunFolder:
+    """Run an experiment into a run folder.
+
+    A unit (one detector on one capture) that fails is an entry with its reason; the others run all the same.
+
+    Parameters
+    ----------
+    experiment : Experiment
+    out : Path, optional
+        New or empty folder; by default ``runs/NAME-TIME``. With ``resume``, the folder to continue.
+    jobs : int, optional
+        Processes of the accuracy pass; all usable cores by default. Latency is always measured alone.
+    resume : bool
+        Continue: units whose detector, sources, capture content and scoring are unchanged are not repeated. Failed
+        ones are.
+    progress : callable, optional
+        Called with a :class:`Progress` after each unit.
+
+    Returns
+    -------
+    RunFolder
+
+    Raises
+    ------
+    StoreError
+        If results cannot be written, or the folder holds another experiment.
+    Interrupted
+        If the user interrupts; nothing finished is lost.
+    """
+    workers = usable_cores() if jobs is None else max(1, jobs)
+    folder = _resumed(experiment, out, workers) if resume else _created(experiment, out, workers)
+    todo = plan(experiment)
+    try:
+        _Run(folder, experiment, todo, workers, progress).carry_out()
+    except KeyboardInterrupt:
+        raise Interrupted(folder.path) from None
+    return folder
+
+
+def _created(experiment: Experiment, out: Path | None, jobs: int) -> RunFolder:
+    if out is None:
+        safe = re.sub(r"[^\w.-]+", "-", experiment.name, flags=re.ASCII).strip("-.")[:60] or "run"
+        out = Path("runs") / f"{safe}-{datetime.now():%Y%m%d-%H%M%S}"
+    manifest = {
+        "experiment": experiment.to_dict(),
+        "detectors": {config.name: Pipeline(config).identity for config in experiment.detectors},
+        "sessions": [environment.session(jobs)],
+    }
+    return RunFolder.create(out, manifest)
+
+
+def _resumed(experiment: Experiment, out: Path | None, jobs: int) -> RunFolder:
+    if out is None:
+        raise StoreError("resuming needs the run folder to continue")
+    folder = RunFolder(out)
+    before, now = folder.manifest["experiment"], plain(experiment.to_dict())
+    if canonical(before) != canonical(now):
+        keys = [key for key in now if canonical(now[key]) != canonical(before.get(key))]
+        raise StoreError(
+            f"{out}: holds a run of another configuration (different: {', '.join(keys)}); "
+            "resume with the same experiment, or give a new folder"
+        )
+    folder.update_manifest(
+        detectors={config.name: Pipeline(config).identity for config in experiment.detectors},
+        sessions=[*folder.manifest["sessions"], environment.session(jobs)],
+    )
+    return folder
+
+
+class _Run:
+    """One session of work on a run folder."""
+
+    def __init__(
+        self,
+        folder: RunFolder,
+        experiment: Experiment,
+        todo: Plan,
+        workers: int,
+        progress: Callable[[Progress], None] | None,
+    ) -> None:
+        self.folder, self.experiment, self.plan = folder, experiment, todo
+        self.workers, self.progress = workers, progress
+        self.rules = rules_of(experiment)
+        self.session = uuid.uuid4().hex
+        self.done = 0
+
+    def carry_out(self) -> None:
+        before = {entry.unit: entry for entry in self.folder.entries()}
+        broken = {entry.unit for entry in self.plan.failures}
+        for entry in self.plan.failures:
+            self.folder.record(entry)
+        for entry in before.values():  # a dataset that is there again
+            if entry.kind == "listing" and entry.unit not in broken:
+                self.folder.record(dataclasses.replace(entry, status="done", reason=""))
+        pending = self._pending(before)
+        self.done = len(self.plan.units) - len(pending)
+        accuracy = [unit for unit in pending if unit.kind == "accuracy"]
+        try:
+            self._detect(accuracy)
+        finally:
+            self._write_scores()
+        contents = self._contents()
+        self.folder.update_manifest(data=contents)
+        for unit in pending:
+            if unit.kind == "latency":
+                self._time(unit, contents.get(unit.capture_id, ""))
+
+    def _pending(self, before: dict[str, Entry]) -> list[Unit]:
+        """Units to run: all but those that gave the same thing before."""
+        maybe = [unit for unit in self.plan.units if unit.id in before and before[unit.id].status == "done"]
+        captures = {unit.capture_id: unit for unit in maybe}
+        jobs = [delayed(content_of)(self._job(unit)) for unit in captures.values()]
+        contents = dict(zip(captures, Parallel(n_jobs=self.workers)(jobs), strict=True)) if jobs else {}
+        same = {
+            unit.id
+            for unit in maybe
+            if before[unit.id].identity == identity_of(unit, contents[unit.capture_id], self._basis(unit))
+        }
+        return [unit for unit in self.plan.units if unit.id not in same]
+
+    def _job(self, unit: Unit) -> Job:
+        return Job(unit, self.rules, self.session)
+
+    def _basis(self, unit: Unit) -> Any:
+        """What a result depends on besides detector and capture. Times also depend on the machine."""
+        if unit.kind == "latency":
+            return [self.experiment.latency.model_dump(), machine()]
+        return [dataclasses.asdict(rule) for rule in self.rules]
+
+    def _detect(self, units: list[Unit]) -> None:
+        remaining = {unit.id: unit for unit in units}
+        try:
+            for finished in self._parallel(units, min(self.workers, len(units))):
+                del remaining[finished.entry.unit]
+                self._store(finished)
+        except BrokenProcessPool:  # a worker died; which unit killed it is not known, so the rest runs one by one
+            for unit in remaining.values():
+                self._store(self._isolated(unit))
+
+    def _parallel(self, units: list[Unit], processes: int) -> Iterator[Finished]:
+        if not units:
+            return
+        pool: Any = Parallel(n_jobs=processes, return_as="generator_unordered", batch_size=1)
+        results = pool(delayed(run_unit)(self._job(unit)) for unit in units)
+        try:
+            yield from results
+        finally:
+            with suppress(BrokenProcessPool):
+                results.close()
+
+    def _isolated(self, unit: Unit) -> Finished:
+        """One unit in a process of its own, which it may take down."""
+        try:
+            finished: Finished = Parallel(n_jobs=2)([delayed(run_unit)(self._job(unit))])[0]
+        except BrokenProcessPool as error:
+            reason = f"{type(error).__name__}: the process died, out of memory or by a crash"
+            return Finished(entry_of(unit, "failed", reason=reason))
+        return finished
+
+    def _store(self, finished: Finished) -> None:
+        entry = finished.entry
+        if finished.header is not None and finished.found is not None:
+            self.folder.write_header(entry.capture_id, finished.header, finished.sha256)
+            self.folder.write_detections(entry.unit, finished.found, finished.candidates)
+        self._journal(entry)
+
+    def _journal(self, entry: Entry) -> None:
+        self.folder.record(entry)
+        self.done += 1
+        if self.progress is not None:
+            self.progress(Progress(self.done, len(self.plan.units), entry))
+
+    def _time(self, unit: Unit, sha256: str) -> None:
+        from uwbbench.timing import measure
+
+        started = time.perf_counter()
+        try:
+            latency = measure(unit.ref, unit.detector, self.experiment.latency)
+        except Exception as error:  # noqa: BLE001 - a measurement that fails is a row
+            self._journal(entry_of(unit, "failed", reason=reason_of(error), traceback=traceback.format_exc()))
+            return
+        self.folder.write_times(unit.id, latency.times_us, latency.to_dict())
+        facts = {**latency.to_dict(), "elapsed_s": time.perf_counter() - started}
+        identity = identity_of(unit, sha256, self._basis(unit))
+        capture_id = unit.capture_id if sha256 else ""
+        self._journal(entry_of(unit, "done", identity=identity, capture_id=capture_id, facts=facts))
+
+    def _contents(self) -> dict[str, str]:
+        """SHA-256 of each stored capture."""
+        known = {entry.capture_id for entry in self.folder.entries() if entry.capture_id}
+        return {capture_id: self.folder.content(capture_id) for capture_id in sorted(known)}
+
+    def _write_scores(self) -> None:
+        entries = self.folder.entries()
+        rows = {entry.unit: entry.scores for entry in entries if entry.status == "done"}
+        self.folder.write_scores(table_of(entries, rows), self.rules)

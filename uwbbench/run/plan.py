@@ -1,0 +1,99 @@
+"""What there is to do: one unit for each detector and capture."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from uwbbench.config.detector import DetectorConfig
+from uwbbench.config.experiment import Experiment
+from uwbbench.config.source import CaptureRef
+from uwbbench.scoring import Region, ScoringRules
+from uwbbench.store.identity import file_id
+from uwbbench.store.journal import Entry
+
+
+@dataclass(frozen=True)
+class Unit:
+    """One detector on one capture, for accuracy or for time.
+
+    Attributes
+    ----------
+    kind : {"accuracy", "latency"}
+    detector : DetectorConfig
+    dataset : str
+        Label of the dataset.
+    ref : CaptureRef
+    """
+
+    kind: Literal["accuracy", "latency"]
+    detector: DetectorConfig
+    dataset: str
+    ref: CaptureRef
+
+    @property
+    def id(self) -> str:
+        """Name of the unit's files: the same in every run of the same experiment."""
+        return file_id([self.kind, self.detector.name, self.dataset, self.capture_id])
+
+    @property
+    def capture_id(self) -> str:
+        """File name of the capture's header."""
+        return file_id([self.ref.dataset, self.ref.params, self.ref.name])
+
+
+@dataclass(frozen=True)
+class Plan:
+    """All units of an experiment.
+
+    Attributes
+    ----------
+    units : tuple of Unit
+        Accuracy first, captures together; latency last.
+    failures : tuple of Entry
+        Datasets whose captures could not be listed.
+    """
+
+    units: tuple[Unit, ...]
+    failures: tuple[Entry, ...]
+
+
+def plan(experiment: Experiment) -> Plan:
+    """Plan of an experiment: lists the captures of its datasets, opens none."""
+    accuracy: list[Unit] = []
+    latency: list[Unit] = []
+    failures: list[Entry] = []
+    for source in experiment.datasets:
+        try:
+            references = source.references()
+        except Exception as error:  # noqa: BLE001 - an adapter may raise anything; the other datasets still run
+            failures.append(
+                Entry(
+                    unit=file_id(["listing", source.label]),
+                    kind="listing",
+                    detector="",
+                    dataset=source.label,
+                    capture="",
+                    status="failed",
+                    reason=reason_of(error),
+                )
+            )
+            continue
+        accuracy += [Unit("accuracy", d, source.label, ref) for ref in references for d in experiment.detectors]
+        timed = references if experiment.latency.captures == "all" else references[:1]
+        latency += [Unit("latency", d, source.label, ref) for ref in timed for d in experiment.detectors]
+    return Plan(tuple(accuracy + (latency if experiment.latency.enabled else [])), tuple(failures))
+
+
+def rules_of(experiment: Experiment) -> tuple[ScoringRules, ...]:
+    """Scoring rules of an experiment, one for each scoring."""
+    region = Region(experiment.region.min_range_m, experiment.region.max_range_m, experiment.region.half_angle_rad)
+    return tuple(
+        ScoringRules(scoring, experiment.gate_m, region, experiment.strongest) for scoring in experiment.scoring
+    )
+
+
+def reason_of(error: BaseException) -> str:
+    """One line that says why something failed."""
+    text = " ".join(str(error).split()) or "no message"
+    return f"{type(error).__name__}: {text if len(text) <= 400 else text[:400] + '...'}"

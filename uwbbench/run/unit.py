@@ -1,0 +1,149 @@
+"""Executing one accuracy unit, in whatever process: any exception becomes a failed entry."""
+
+from __future__ import annotations
+
+import dataclasses
+import time
+import traceback
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from uwbbench.api.capture import Capture, CaptureHeader
+from uwbbench.api.detections import Detections
+from uwbbench.config.source import CaptureRef
+from uwbbench.pipeline import Pipeline
+from uwbbench.run.plan import Unit, reason_of
+from uwbbench.run.scored import score_rows
+from uwbbench.scoring import ScoringRules
+from uwbbench.store.identity import digest
+from uwbbench.store.journal import Entry, Status
+
+
+@dataclass(frozen=True)
+class Job:
+    """A unit with all that a worker process needs to know.
+
+    Attributes
+    ----------
+    unit : Unit
+    rules : tuple of ScoringRules
+    session : str
+        Distinct for each run: a worker that outlives a run must not use its captures for the next.
+    """
+
+    unit: Unit
+    rules: tuple[ScoringRules, ...]
+    session: str
+
+
+@dataclass(frozen=True)
+class Finished:
+    """What a unit gave.
+
+    Attributes
+    ----------
+    entry : Entry
+    found, candidates : Detections or None
+    header : CaptureHeader or None
+    sha256 : str
+        Of the capture's content.
+    """
+
+    entry: Entry
+    found: Detections | None = None
+    candidates: Detections | None = None
+    header: CaptureHeader | None = None
+    sha256: str = ""
+
+
+_last: list[tuple[str, CaptureRef, Capture]] = []
+
+
+def _opened(session: str, ref: CaptureRef) -> Capture:
+    """Capture of a reference; the last one is kept, as the units of a capture follow each other."""
+    if not (_last and _last[0][:2] == (session, ref)):
+        _last[:] = [(session, ref, ref.open())]
+    return _last[0][2]
+
+
+def content_of(job: Job) -> str:
+    """SHA-256 of a unit's capture; empty where it cannot be opened."""
+    try:
+        return _opened(job.session, job.unit.ref).sha256
+    except Exception:  # noqa: BLE001 - the unit itself will fail in the same way, and say so
+        return ""
+
+
+def identity_of(unit: Unit, sha256: str, basis: Any) -> str:
+    """Hash of all that a unit's result depends on: detector with sources, capture content, and the ``basis``."""
+    return digest([unit.kind, Pipeline(unit.detector).identity, sha256, basis])
+
+
+def run_unit(job: Job) -> Finished:
+    """Detect and score on one capture with one thread."""
+    from threadpoolctl import threadpool_limits
+
+    started = time.perf_counter()
+    unit = job.unit
+    try:
+        with threadpool_limits(1):
+            finished = _detected(job)
+    except Exception as error:  # noqa: BLE001 - a plugin may raise anything; the other units still run
+        return Finished(entry_of(unit, "failed", reason=reason_of(error), traceback=traceback.format_exc()))
+    finished.entry.facts["elapsed_s"] = time.perf_counter() - started
+    return finished
+
+
+def _detected(job: Job) -> Finished:
+    unit = job.unit
+    capture = _opened(job.session, unit.ref)
+    with_candidates = any(rule.scoring == "peak" for rule in job.rules)
+    found = Pipeline(unit.detector).run(capture, candidates=with_candidates)
+    candidates = found.candidates if with_candidates else None
+    header = capture.header
+    facts = {
+        "source": header.source,
+        "frames": len(header),
+        "processed": len(found.processed),
+        "detections": len(found),
+        "exhaustive": None if header.truth is None else header.truth.exhaustive,
+        "materials": _materials(header),
+        "channel": header.radar.channel,
+        "notes": list(found.notes),
+        "chain": dict(found.chain),
+        "sha256": capture.sha256,
+    }
+    entry = entry_of(
+        unit,
+        "done",
+        identity=identity_of(unit, capture.sha256, [dataclasses.asdict(rule) for rule in job.rules]),
+        capture_id=unit.capture_id,
+        scores=score_rows(found, header, job.rules),
+        facts=facts,
+    )
+    return Finished(entry, _bare(found), None if candidates is None else _bare(candidates), header, capture.sha256)
+
+
+def entry_of(unit: Unit, status: Status, **values: Any) -> Entry:
+    """Journal entry of a unit."""
+    return Entry(
+        unit=unit.id,
+        kind=unit.kind,
+        detector=unit.detector.name,
+        dataset=unit.dataset,
+        capture=unit.ref.name,
+        status=status,
+        **values,
+    )
+
+
+def _materials(header: CaptureHeader) -> list[str]:
+    things: Sequence[Any] = header.truth.objects if header.truth else ()
+    return sorted({thing.material for thing in things if not thing.structure})
+
+
+def _bare(found: Detections) -> Detections:
+    """Detections without the means to find candidates later, which would drag the capture between processes."""
+    columns: dict[str, Any] = found.columns
+    return Detections(**columns, processed=found.processed, notes=found.notes, chain=found.chain)
