@@ -78,6 +78,11 @@ class Stream:
         return Detections.join(out).annotated(notes=self.notes)
 
     @property
+    def stages(self) -> tuple[Stage[Any], ...]:
+        """The stages at work, in order."""
+        return tuple(opened.stage for opened in self._stages)
+
+    @property
     def notes(self) -> tuple[str, ...]:
         """What a reader of the results must know, so far."""
         return tuple(dict.fromkeys([*self._notes, *(note for o in self._stages for note in o.stage.notes)]))

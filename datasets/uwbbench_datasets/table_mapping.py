@@ -9,16 +9,14 @@ from __future__ import annotations
 import csv
 import math
 import re
-from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import Any, Literal, TypeVar
+from typing import Any, Literal
 
 import numpy as np
-from pydantic import Field, ValidationError, field_validator, model_validator
+from pydantic import Field, field_validator, model_validator
 
-from uwbbench.api import CaptureError, ConfigError, FloatArray, Obstacle, Params, nearest
+from uwbbench.api import CaptureError, ConfigError, FloatArray, Obstacle, Params, YamlFile, checked, read_yaml
 
-M = TypeVar("M", bound=Params)
 Vector = tuple[float, float, float]
 Point = tuple[float, float]
 
@@ -249,15 +247,8 @@ def read_mapping(path: Path) -> TableMapping:
     ConfigError
         If a file cannot be read or a key is wrong; names the file, every wrong key and the nearest valid one.
     """
-    import yaml
-
-    try:
-        data = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
-        raise ConfigError(f"{path}: cannot be read as YAML: {error}") from error
-    if not isinstance(data, dict):
-        raise ConfigError(f"{path}: expected keys and values, found {type(data).__name__}")
-    mapping = _checked(TableMapping, data, str(path))
+    source = read_yaml(path)
+    mapping = checked(TableMapping, source.data, source)
     inside = (*mapping.files, *([mapping.truth.objects_file] if mapping.truth and mapping.truth.objects_file else []))
     for name in inside:
         below(path.parent, name)
@@ -304,7 +295,11 @@ def read_objects(path: Path) -> list[ObjectFacts]:
             rows = [(reader.line_num, row) for reader in [csv.DictReader(file)] for row in reader]
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise ConfigError(f"{path}: cannot be read as CSV: {error}") from error
-    return [_checked(ObjectFacts, _object(row, f"{path}:{line}"), f"{path}:{line}") for line, row in rows]
+    objects = []
+    for line, row in rows:
+        fields = _object(row, f"{path}:{line}")
+        objects.append(checked(ObjectFacts, fields, YamlFile(f"{path}:{line}", fields, {})))
+    return objects
 
 
 def _object(row: dict[str, Any], where: str) -> dict[str, Any]:
@@ -322,44 +317,3 @@ def _object(row: dict[str, Any], where: str) -> dict[str, Any]:
     if "runs" in fields:
         fields["runs"] = fields["runs"].split()
     return fields
-
-
-def _checked(model: type[M], data: Any, where: str) -> M:
-    """Model made of parsed values, or an error that names each wrong key."""
-    try:
-        return model.model_validate(data)
-    except ValidationError as error:
-        problems = [_problem(model, item, where) for item in error.errors(include_url=False)]
-        raise ConfigError("\n".join(dict.fromkeys(problems))) from None
-
-
-def _problem(model: type[Params], item: Any, where: str) -> str:
-    path = [part for part in item["loc"] if not (isinstance(part, str) and ("[" in part or part in _UNION_NAMES))]
-    place = f"{where}: {'.'.join(map(str, path))}" if path else where
-    if item["type"] == "extra_forbidden":
-        return f"{place}: unknown key '{path[-1]}'.{nearest(str(path[-1]), _keys(model, path[:-1]))}"
-    if item["type"] == "missing":
-        return f"{place}: key '{path[-1]}' is missing"
-    given = item.get("input")
-    tail = "" if isinstance(given, dict | list) or item["type"] == "value_error" else f", found {given!r}"
-    return f"{place}: {item['msg'].removeprefix('Value error, ')}{tail}"
-
-
-_UNION_NAMES = ("float", "int", "str", "none")
-
-
-def _keys(model: type[Params], path: Iterable[Any]) -> list[str]:
-    """Valid keys of the model that a path leads to."""
-    here = model
-    for part in path:
-        by_key = {field.alias or name: field for name, field in here.model_fields.items()}
-        if part in by_key:
-            here = next(_models_in(by_key[part].annotation), here)
-    return [field.alias or name for name, field in here.model_fields.items()]
-
-
-def _models_in(annotation: Any) -> Iterator[type[Params]]:
-    if isinstance(annotation, type) and issubclass(annotation, Params):
-        yield annotation
-    for part in getattr(annotation, "__args__", ()):
-        yield from _models_in(part)

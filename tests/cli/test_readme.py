@@ -10,11 +10,11 @@ import pytest
 import typer.main
 
 from uwbbench.api import Block
+from uwbbench.api.yaml_file import parse_yaml
 from uwbbench.cli import app
 from uwbbench.config.locate import config_folder, shipped
-from uwbbench.config.schema import experiment_schema
-from uwbbench.config.yaml_file import parse_yaml
 from uwbbench.pipeline import detector_from_yaml
+from uwbbench.schema import experiment_schema
 
 _README = Path(__file__).parents[2] / "README.md"
 

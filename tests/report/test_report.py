@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from uwbbench.api import Capture, StoreError, write_capture
-from uwbbench.config.experiment import read_experiment
 from uwbbench.report import Report, markdown, sheets, write_report
 from uwbbench.run import rescore, run_experiment
+from uwbbench.run.experiment import read_experiment
 from uwbbench.scoring import ScoringRules, score
 from uwbbench.store import RunFolder
 from uwbbench.store.identity import plain

@@ -10,7 +10,7 @@ import pytest
 from joblib.externals.loky import get_reusable_executor
 
 from uwbbench import registry
-from uwbbench.config.experiment import Experiment, read_experiment
+from uwbbench.run.experiment import Experiment, read_experiment
 
 MISBEHAVING = '''
 import os, pathlib, time

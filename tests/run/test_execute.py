@@ -10,9 +10,9 @@ import pandas as pd
 import pytest
 
 from uwbbench.api import StoreError
-from uwbbench.config.experiment import Experiment
 from uwbbench.pipeline import load_detector
 from uwbbench.run import Progress, rescore, run_experiment
+from uwbbench.run.experiment import Experiment
 from uwbbench.scoring import Region, ScoringRules, score
 from uwbbench.store import RunFolder
 

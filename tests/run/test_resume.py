@@ -13,8 +13,8 @@ import pandas as pd
 import pytest
 
 from uwbbench.api import StoreError, write_capture
-from uwbbench.config.experiment import Experiment
 from uwbbench.run import Interrupted, Progress, run_experiment
+from uwbbench.run.experiment import Experiment
 from uwbbench.store import RunFolder
 
 MakeExperiment = Callable[..., Experiment]
@@ -23,7 +23,7 @@ DetectorFile = Callable[..., Path]
 SCRIPT = """\
 import sys
 from pathlib import Path
-from uwbbench.config.experiment import read_experiment
+from uwbbench.run.experiment import read_experiment
 from uwbbench.run import Interrupted, run_experiment
 if __name__ == "__main__":
     try:

@@ -10,9 +10,9 @@ import pytest
 
 from uwbbench.api import Trajectory, write_capture
 from uwbbench.config.detector import detector_from_text, read_detector
-from uwbbench.config.experiment import LatencyModel
 from uwbbench.config.source import CaptureRef
 from uwbbench.timing import LatencyError, launch, measure
+from uwbbench.timing.settings import LatencyModel
 
 REF = CaptureRef("approach", {"speed_m_s": 3.0}, (), "approach-ch9-metal-1")
 

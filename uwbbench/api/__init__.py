@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from uwbbench.api.block import Block
     from uwbbench.api.capture import Capture, CaptureHeader, Samples, analytic
     from uwbbench.api.capture_file import open_capture, write_capture
+    from uwbbench.api.check import checked
     from uwbbench.api.dataset import Card, Dataset, DatasetFile
     from uwbbench.api.detections import COLUMNS, Detections
     from uwbbench.api.errors import (
@@ -30,12 +31,14 @@ if TYPE_CHECKING:
     from uwbbench.api.radar import Radar
     from uwbbench.api.stage import Filter, Params, Stage, ports
     from uwbbench.api.truth import Obstacle, Sight, Trajectory, Truth
+    from uwbbench.api.yaml_file import YamlFile, read_yaml
 
 _HOME = {
     "arrays": ("BoolArray", "ComplexArray", "FloatArray", "IntArray"),
     "block": ("Block",),
     "capture": ("Capture", "CaptureHeader", "Samples", "analytic"),
     "capture_file": ("open_capture", "write_capture"),
+    "check": ("checked",),
     "dataset": ("Card", "Dataset", "DatasetFile"),
     "detections": ("COLUMNS", "Detections"),
     "errors": (
@@ -53,6 +56,7 @@ _HOME = {
     "radar": ("Radar",),
     "stage": ("Filter", "Params", "Stage", "ports"),
     "truth": ("Obstacle", "Sight", "Trajectory", "Truth"),
+    "yaml_file": ("YamlFile", "read_yaml"),
 }
 _MODULE_OF = {name: module for module, names in _HOME.items() for name in names}
 
@@ -88,11 +92,14 @@ __all__ = [
     "Trajectory",
     "Truth",
     "UwbbenchError",
+    "YamlFile",
     "analytic",
+    "checked",
     "magnitude",
     "nearest",
     "open_capture",
     "ports",
+    "read_yaml",
     "write_capture",
 ]
 

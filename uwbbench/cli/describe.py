@@ -204,9 +204,9 @@ def checked_file(path: Path) -> str:
     ConfigError, PluginError
         If it is wrong, or neither of the two.
     """
-    from uwbbench.config.experiment import read_experiment
-    from uwbbench.config.yaml_file import read_yaml
+    from uwbbench.api.yaml_file import read_yaml
     from uwbbench.pipeline import load_detector
+    from uwbbench.run.experiment import read_experiment
 
     keys = read_yaml(path).data
     if "pipeline" in keys or "extends" in keys:

@@ -59,9 +59,9 @@ def score(
 
 def _latency_us(path: Path, opened: Capture, pipeline: Pipeline) -> dict[str, Any]:
     """Times in microseconds, measured in a fresh process, and the number of calls behind them."""
-    from uwbbench.config.experiment import LatencyModel
     from uwbbench.config.source import CaptureRef
     from uwbbench.timing import measure
+    from uwbbench.timing.settings import LatencyModel
 
     receiver = opened.radar.receiver if len(opened.receivers) > 1 else None
     measured = measure(

@@ -136,7 +136,7 @@ def schema(
     ] = None,
 ) -> None:
     """Print a JSON Schema of such a file, for editors."""
-    from uwbbench.config.schema import detector_schema, experiment_schema
+    from uwbbench.schema import detector_schema, experiment_schema
 
     made = detector_schema() if file is File.DETECTOR else experiment_schema()
     if output is None:

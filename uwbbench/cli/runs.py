@@ -44,9 +44,9 @@ def run(
     Prints a leaderboard and leaves a run folder. A detector or capture that fails is a row with its reason; the exit
     code is then 3.
     """
-    from uwbbench.config.experiment import read_experiment
     from uwbbench.config.override import parse_settings
     from uwbbench.run import Interrupted, run_experiment
+    from uwbbench.run.experiment import read_experiment
 
     if out is not None and resume is not None:
         raise ConfigError("--out makes a new run folder and --resume continues one; give one of them")

@@ -1,1 +1,1 @@
-"""Configuration: safe YAML with line numbers, checked models, and where shipped files are found."""
+"""Configuration: detector files, overrides, captures by name, and where shipped files are found."""

@@ -10,11 +10,11 @@ from typing import Any, Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 from uwbbench import registry
+from uwbbench.api.check import checked
 from uwbbench.api.errors import ConfigError, PluginError
-from uwbbench.config.check import checked
+from uwbbench.api.yaml_file import YamlFile, parse_yaml, read_yaml
 from uwbbench.config.locate import find_config
 from uwbbench.config.override import merged, with_values
-from uwbbench.config.yaml_file import YamlFile, parse_yaml, read_yaml
 
 BY_CHANNEL = "by_channel"
 """Key of a parameter whose value depends on the capture's channel: ``{by_channel: {5: 1.0, 9: 0.2, other: 0.2}}``."""

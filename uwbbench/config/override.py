@@ -77,7 +77,7 @@ def _item(items: list[Any], rest: str, path: str, where: str) -> tuple[int, str]
 
 def parse_settings(texts: Iterable[str]) -> dict[str, Any]:
     """Options ``a.b=value`` as changes by path; values follow the YAML rules."""
-    from uwbbench.config.yaml_file import parse_value
+    from uwbbench.api.yaml_file import parse_value
 
     changes = {}
     for text in texts:

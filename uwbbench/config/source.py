@@ -10,9 +10,9 @@ from typing import Any
 
 from uwbbench import registry
 from uwbbench.api.capture import Capture
+from uwbbench.api.check import checked
 from uwbbench.api.dataset import Dataset
-from uwbbench.config.check import checked
-from uwbbench.config.yaml_file import Path_, YamlFile
+from uwbbench.api.yaml_file import Path_, YamlFile
 
 
 def data_roots(data_dir: Path | None = None, config_file: Path | None = None) -> tuple[Path, ...]:

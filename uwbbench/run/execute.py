@@ -18,9 +18,9 @@ from typing import Any
 from joblib import Parallel, delayed
 
 from uwbbench.api.errors import StoreError, UwbbenchError
-from uwbbench.config.experiment import Experiment
 from uwbbench.pipeline import Pipeline
 from uwbbench.run import environment
+from uwbbench.run.experiment import Experiment
 from uwbbench.run.plan import Plan, Unit, plan, reason_of, rules_of
 from uwbbench.run.scored import table_of
 from uwbbench.run.unit import Finished, Job, content_of, entry_of, identity_of, run_unit

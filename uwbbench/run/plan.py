@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 from uwbbench.config.detector import DetectorConfig
-from uwbbench.config.experiment import Experiment
 from uwbbench.config.source import CaptureRef
+from uwbbench.run.experiment import Experiment
 from uwbbench.scoring import Region, ScoringRules
 from uwbbench.store.identity import file_id
 from uwbbench.store.journal import Entry

@@ -14,10 +14,10 @@ import yaml
 
 from uwbbench.api.errors import UwbbenchError
 from uwbbench.config.detector import DetectorConfig, read_detector
-from uwbbench.config.experiment import LatencyModel
 from uwbbench.config.source import CaptureRef
 from uwbbench.timing.latency import Latency
 from uwbbench.timing.machine import cpu_model
+from uwbbench.timing.settings import LatencyModel
 
 ONE_THREAD = dict.fromkeys(
     (

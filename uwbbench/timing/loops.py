@@ -78,7 +78,7 @@ def warm_up(pipeline: Pipeline, capture: Capture, whole: Frames, windows: int) -
 def stream_pass(pipeline: Pipeline, capture: Capture, whole: Frames) -> tuple[FloatArray, BoolArray | None, float]:
     """One frame a call: time of every call, which calls clustered, and the time of the flush, in microseconds."""
     stream, calls = pipeline.open(capture), cut(whole, 1)
-    counters = [opened.stage for opened in stream._stages if hasattr(opened.stage, "clusterings")]
+    counters = [stage for stage in stream.stages if hasattr(stage, "clusterings")]
     clustered = np.zeros(len(calls), bool)
     times_us = np.empty(len(calls))
     before = 0

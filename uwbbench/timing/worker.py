@@ -97,8 +97,8 @@ NULL = {"schema": 1, "name": "null", "pipeline": [{"use": "reference.nothing"}]}
 
 
 def _pipeline(data: dict[str, Any]) -> Any:
+    from uwbbench.api.yaml_file import YamlFile
     from uwbbench.config.detector import check_detector
-    from uwbbench.config.yaml_file import YamlFile
     from uwbbench.pipeline import Pipeline
 
     return Pipeline(check_detector(data, YamlFile(f"detector '{data['name']}'", data, {})))

@@ -13,13 +13,14 @@ from typing import Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, field_validator
 
 from uwbbench import registry
+from uwbbench.api.check import checked
 from uwbbench.api.errors import CaptureError, ConfigError, PluginError, UwbbenchError, nearest
-from uwbbench.config.check import checked
+from uwbbench.api.yaml_file import Path_, YamlFile, read_yaml
 from uwbbench.config.detector import DetectorConfig, read_detector
 from uwbbench.config.locate import find_config
 from uwbbench.config.override import merged, with_values
 from uwbbench.config.source import CaptureRef, data_roots, open_dataset
-from uwbbench.config.yaml_file import Path_, YamlFile, read_yaml
+from uwbbench.timing.settings import LatencyModel
 
 Scoring = Literal["frame", "peak", "object"]
 
@@ -65,20 +66,6 @@ class RegionModel(_Model):
     def half_angle_rad(self) -> float | None:
         """The same in radians."""
         return None if self.half_angle_deg is None else math.radians(self.half_angle_deg)
-
-
-class LatencyModel(_Model):
-    """How calls are timed."""
-
-    enabled: bool = True
-    captures: Literal["first", "all"] = Field(default="first", description="Captures of each dataset that are timed.")
-    frames: int = Field(default=2000, ge=1, description="Frames timed at most, from the start of a capture.")
-    warmup_windows: int = Field(default=10, ge=2, description="Windows of warm-up at most, if they never agree.")
-    reference: str | None = Field(
-        default="paper-filtering",
-        description="Detector that each one is compared with, in alternating blocks; null: none.",
-    )
-    timeout_s: float = Field(default=600.0, gt=0, description="A measurement that takes longer has failed.")
 
 
 class IntervalModel(_Model):

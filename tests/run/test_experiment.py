@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 
 from uwbbench.api import ConfigError, PluginError, UwbbenchError
-from uwbbench.config.experiment import read_experiment
 from uwbbench.config.locate import shipped
+from uwbbench.run.experiment import read_experiment
 
 SMALL = """\
 schema: 1

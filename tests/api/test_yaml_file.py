@@ -5,7 +5,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from uwbbench.api import ConfigError
-from uwbbench.config.yaml_file import YamlFile, parse_value, parse_yaml, read_yaml
+from uwbbench.api.yaml_file import YamlFile, parse_value, parse_yaml, read_yaml
 
 
 @pytest.mark.parametrize(

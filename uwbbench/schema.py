@@ -14,7 +14,7 @@ from pydantic.json_schema import models_json_schema
 from uwbbench import registry
 from uwbbench.api.errors import PluginError
 from uwbbench.config.detector import BY_CHANNEL, DetectorModel, StepModel
-from uwbbench.config.experiment import DatasetUse, ExperimentModel
+from uwbbench.run.experiment import DatasetUse, ExperimentModel
 
 Schema = dict[str, Any]
 DIALECT = "https://json-schema.org/draft/2020-12/schema"

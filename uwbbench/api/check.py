@@ -7,7 +7,7 @@ from typing import Any, TypeVar
 from pydantic import BaseModel, ValidationError
 
 from uwbbench.api.errors import ConfigError, nearest
-from uwbbench.config.yaml_file import Path_, YamlFile
+from uwbbench.api.yaml_file import Path_, YamlFile
 
 M = TypeVar("M", bound=BaseModel)
 

@@ -9,9 +9,9 @@ import pytest
 
 from uwbbench import registry
 from uwbbench.api import PluginError
+from uwbbench.api.yaml_file import parse_yaml, read_yaml
 from uwbbench.config.locate import shipped
-from uwbbench.config.schema import detector_schema, experiment_schema
-from uwbbench.config.yaml_file import parse_yaml, read_yaml
+from uwbbench.schema import detector_schema, experiment_schema
 
 STEPS = "schema: 1\nname: x\npipeline:\n  - {use: profile.amplitude}\n"
 EXPERIMENT = "schema: 1\ndetectors: [paper]\ndatasets:\n  - {use: approach}\n"

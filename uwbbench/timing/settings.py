@@ -1,0 +1,23 @@
+"""What an experiment may say about how calls are timed."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+
+class LatencyModel(BaseModel):
+    """How calls are timed."""
+
+    model_config = ConfigDict(extra="forbid", populate_by_name=True, allow_inf_nan=False, frozen=True)
+
+    enabled: bool = True
+    captures: Literal["first", "all"] = Field(default="first", description="Captures of each dataset that are timed.")
+    frames: int = Field(default=2000, ge=1, description="Frames timed at most, from the start of a capture.")
+    warmup_windows: int = Field(default=10, ge=2, description="Windows of warm-up at most, if they never agree.")
+    reference: str | None = Field(
+        default="paper-filtering",
+        description="Detector that each one is compared with, in alternating blocks; null: none.",
+    )
+    timeout_s: float = Field(default=600.0, gt=0, description="A measurement that takes longer has failed.")
