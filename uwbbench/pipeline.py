@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import json
 import sys
@@ -16,7 +17,7 @@ from uwbbench import registry
 from uwbbench.api.block import Block
 from uwbbench.api.capture import Capture, CaptureHeader
 from uwbbench.api.detections import Detections
-from uwbbench.api.errors import ConfigError
+from uwbbench.api.errors import ConfigError, PluginError
 from uwbbench.api.frames import Frames
 from uwbbench.api.stage import Filter, Stage
 from uwbbench.config.detector import DetectorConfig, detector_from_text, read_detector
@@ -151,10 +152,14 @@ class Pipeline:
         for step in self.config.steps:
             stage = registry.load("stages", step.use)
             for port in sorted(stage.consumes - available):
-                hint = "no step makes it"
                 if port in makers:
                     hint = f"step '{makers[port]}' makes it, but stands later, or its result is gone by then"
-                raise ConfigError(f"detector '{self.name}': step '{step.label}' needs '{port}': {hint}")
+                else:
+                    hint = (
+                        f"no step makes it; put one of these before it: {', '.join(_makers_of(port)) or 'none known'}"
+                    )
+                place = f"{step.place}: " if step.place else ""
+                raise ConfigError(f"{place}detector '{self.name}': step '{step.label}' needs '{port}': {hint}")
             available = (available - stage.removes) | stage.produces
         if "detections" not in available:
             raise ConfigError(f"detector '{self.name}': no step produces detections")
@@ -246,6 +251,16 @@ class Pipeline:
         )  # channel numbers become text, which sorts with "other"
         text = json.dumps({"detector": resolved, "sources": sources}, sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _makers_of(port: str) -> list[str]:
+    """Installed stages that produce a port; those that cannot be loaded are passed over."""
+    found = []
+    for name in registry.entries("stages"):
+        with contextlib.suppress(PluginError):
+            if port in registry.load("stages", name).produces:
+                found.append(name)
+    return found
 
 
 def _candidates(found: Detections, rejected: Detections) -> Detections:

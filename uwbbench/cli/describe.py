@@ -8,6 +8,7 @@ from typing import Any
 
 from uwbbench import registry
 from uwbbench.api.errors import ConfigError, PluginError, nearest
+from uwbbench.api.yaml_file import read_yaml
 from uwbbench.config.locate import find_config, shipped
 
 _CLASSES = ("stages", "datasets", "metrics")
@@ -204,17 +205,28 @@ def checked_file(path: Path) -> str:
     ConfigError, PluginError
         If it is wrong, or neither of the two.
     """
-    from uwbbench.api.yaml_file import read_yaml
     from uwbbench.pipeline import load_detector
     from uwbbench.run.experiment import read_experiment
 
     keys = read_yaml(path).data
+    if "pipeline" not in keys and ("detectors" in keys or "datasets" in keys or _extends_experiment(path, keys)):
+        experiment = read_experiment(path)
+        return f"experiment '{experiment.name}', {len(experiment.detectors)} detectors, fine"
     if "pipeline" in keys or "extends" in keys:
         pipeline = load_detector(path if path.is_absolute() else Path.cwd() / path)
         return f"detector '{pipeline.name}', {len(pipeline.config.steps)} steps, fine"
-    if "detectors" in keys or "datasets" in keys:
-        experiment = read_experiment(path)
-        return f"experiment '{experiment.name}', {len(experiment.detectors)} detectors, fine"
     near = [nearest(str(key), ["pipeline", "extends", "detectors", "datasets"]) for key in keys]
     hint = next((text for text in near if text.startswith(" Did")), "")
     raise ConfigError(f"{path}: neither a detector ('pipeline' or 'extends') nor an experiment ('detectors').{hint}")
+
+
+def _extends_experiment(path: Path, keys: dict[str, Any]) -> bool:
+    """Whether a file that only extends another, and says no more of what it is, extends an experiment."""
+    parent = keys.get("extends")
+    if not isinstance(parent, str):
+        return False
+    try:
+        found = find_config("experiments", parent, path.parent)
+    except ConfigError:
+        return False
+    return "detectors" in read_yaml(found).data

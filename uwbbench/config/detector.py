@@ -60,12 +60,15 @@ class Step:
         Raw parameters; values may depend on the channel.
     optional : bool
         May be left out where the capture lacks what the stage needs.
+    place : str
+        File, line and key it was read from, for messages.
     """
 
     use: str
     label: str
     params: dict[str, Any] = field(default_factory=dict)
     optional: bool = False
+    place: str = field(default="", compare=False)
 
     def params_for(self, channel: int | None) -> tuple[dict[str, Any], list[str]]:
         """Parameters for a channel, and the names of those that fell back to ``other``."""
@@ -173,7 +176,7 @@ def check_detector(data: Mapping[str, Any], source: YamlFile) -> DetectorConfig:
             raise ConfigError(
                 f"{source.place(('pipeline', index))}: step '{label}' appears twice; name one of them with 'as'"
             )
-        step = Step(item.use, label, item.params, item.optional)
+        step = Step(item.use, label, item.params, item.optional, source.place(("pipeline", index)))
         _check_params(step, source, index)
         steps.append(step)
     return DetectorConfig(model.name, tuple(steps), model.description, model.citation, model.fidelity)
