@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from typing import ClassVar, Literal, TypeVar
+from typing import ClassVar, Literal, Self, TypeVar
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
-from pydantic import Field, field_validator
+from pydantic import Field, field_validator, model_validator
 
 from uwbbench.api import Block, BoolArray, ConfigError, Detections, FloatArray, Params, Radar, Stage, ports
 from uwbbench_detectors.cfar_factors import Statistic, TrainingWindow, order_rank, threshold_factor
@@ -26,6 +26,16 @@ class CfarParams(Params):
         le=64,
         description="Cells on each side between the tested cell and its training cells. The main lobe of a 500 MHz "
         "pulse at 1 ns reaches 2 to 3 taps to either side: with fewer a pulse raises its own threshold.",
+    )
+    training_pulses: float | None = Field(
+        None,
+        gt=0,
+        le=128,
+        description="Training cells of both sides in pulse lengths (1 / bandwidth) instead of taps, so that one window "
+        "fits radars of any sampling; rounded to an even number of taps.",
+    )
+    guard_pulses: float | None = Field(
+        None, ge=0, le=32, description="Guard cells on each side in pulse lengths instead of taps."
     )
     false_alarm_rate: float = Field(
         1e-3, ge=1e-12, le=0.1, description="Probability that a cell of noise alone exceeds its threshold."
@@ -54,6 +64,23 @@ class CfarParams(Params):
         if value % 2:
             raise ValueError(f"training_taps are shared by two sides and must be even, found {value}")
         return value
+
+    @model_validator(mode="after")
+    def _one_unit(self) -> Self:
+        for name in ("training", "guard"):
+            if {f"{name}_taps", f"{name}_pulses"} <= self.model_fields_set:
+                raise ValueError(f"give {name}_taps or {name}_pulses, not both")
+        return self
+
+    def window_for(self, radar: Radar) -> tuple[int, int]:
+        """Training taps on one side, and guard taps on one side, for a radar."""
+        pulse_taps = 1 / (radar.bandwidth_hz * radar.sample_interval_s)
+        half, guard = self.training_taps // 2, self.guard_taps
+        if self.training_pulses is not None:
+            half = max(round(self.training_pulses * pulse_taps / 2), 1)
+        if self.guard_pulses is not None:
+            guard = round(self.guard_pulses * pulse_taps)
+        return half, guard
 
 
 P = TypeVar("P", bound=CfarParams)
@@ -87,12 +114,12 @@ class Cfar(Stage[P]):
         p = self.params
         name = f"cfar.{self.statistic}"
         self._start = profile_start(name, p.skip_taps, radar)
-        self._half = p.training_taps // 2
-        self._edge = self._half + p.guard_taps
+        self._half, self._guard = p.window_for(radar)
+        self._edge = self._half + self._guard
         tested = radar.taps - self._start
         if tested < 2 * self._edge:
             raise ConfigError(
-                f"{name}: {p.training_taps} training_taps and {p.guard_taps} guard_taps on each side need "
+                f"{name}: {2 * self._half} training taps and {self._guard} guard taps on each side need "
                 f"{2 * self._edge} taps, but {tested} of the {radar.taps} taps of a frame are tested; lower one of them"
             )
         self._factor = np.full(tested, self._factor_for(1))
@@ -108,7 +135,7 @@ class Cfar(Stage[P]):
         return 1.0
 
     def _factor_for(self, sides: Literal[1, 2]) -> float:
-        window = TrainingWindow(self._half, sides, self.params.guard_taps)
+        window = TrainingWindow(self._half, sides, self._guard)
         bandwidth = self.radar.bandwidth_hz * self.radar.sample_interval_s
         correlated = self.params.noise == "correlated"
         return threshold_factor(
@@ -140,7 +167,7 @@ class Cfar(Stage[P]):
                 "there is no threshold, and nothing is detected in them"
             )
         if self.params.cells == "maxima":
-            detected &= _crests(amplitude, max(self.params.guard_taps, 1))[:, self._start :]
+            detected &= _crests(amplitude, max(self._guard, 1))[:, self._start :]
         row, cell = np.nonzero(detected)
         tap = cell + self._start
         found = Detections(
@@ -179,7 +206,7 @@ class HalvesCfar(Cfar[CfarParams]):
             mean += power[:, offset : offset + windows]
         mean /= half
         # The window that starts at tap w lies right of cell w - guard - 1 and left of cell w + half + guard.
-        beyond = self.params.guard_taps + 1
+        beyond = self._guard + 1
         inner = power.shape[1] - 2 * edge
         return np.concatenate(
             [
@@ -273,14 +300,14 @@ class OrderedStatistic(Cfar[OrderedStatisticParams]):
 
     def estimate(self, power: FloatArray) -> FloatArray:
         """Noise estimate of every cell (frames, cells)."""
-        at_once = max(SORTED_AT_ONCE // (power.shape[1] * self.params.training_taps), 1)
+        at_once = max(SORTED_AT_ONCE // (power.shape[1] * 2 * self._half), 1)
         parts = [self._estimate(power[start : start + at_once]) for start in range(0, len(power), at_once)]
         return np.concatenate(parts) if parts else np.empty_like(power)
 
     def _estimate(self, power: FloatArray) -> FloatArray:
         half, edge = self._half, self._edge
         side = sliding_window_view(power, half, axis=1)
-        beyond = self.params.guard_taps + 1
+        beyond = self._guard + 1
         inner = power.shape[1] - 2 * edge
         both = np.concatenate([side[:, :inner], side[:, edge + beyond : edge + beyond + inner]], axis=2)
         return np.concatenate(

@@ -238,3 +238,21 @@ def test_a_threshold_below_the_noise_is_refused(make_radar, make_stage):
 def test_wrong_parameters_are_refused_when_the_detector_is_loaded(params, message):
     with pytest.raises(ConfigError, match=message):
         detector_from_yaml(f"schema: 1\nname: test\npipeline: [{{use: cfar.ca, params: {{{params}}}}}]\n")
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_window_in_pulse_lengths_is_that_of_taps_on_a_radar_sampled_twice_a_pulse(
+    make_radar, make_block, make_stage, run_stage, kind
+):
+    radar = make_radar(50, noise_taps=0, sample_interval_s=SAMPLE_INTERVAL_S, bandwidth_hz=499.2e6)
+    block = make_block(complex_noise((200, 50), seed=3))
+    in_taps = run_stage(make_stage(f"cfar.{kind}", false_alarm_rate=1e-2), radar, block).detections
+    in_pulses = make_stage(f"cfar.{kind}", training_pulses=6, guard_pulses=1, false_alarm_rate=1e-2)
+    np.testing.assert_array_equal(run_stage(in_pulses, radar, block).detections["tap"], in_taps["tap"])
+    finer = make_radar(200, noise_taps=0, sample_interval_s=61.035e-12, bandwidth_hz=1.7e9)
+    assert in_pulses.params.window_for(finer) == (29, 10)
+
+
+def test_a_window_in_taps_and_in_pulse_lengths_at_once_is_refused(make_stage):
+    with pytest.raises(ValueError, match="guard_taps or guard_pulses, not both"):
+        make_stage("cfar.ca", guard_taps=2, guard_pulses=1)
