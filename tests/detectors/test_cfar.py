@@ -212,7 +212,7 @@ def test_long_frames_are_sorted_in_pieces_with_the_same_result(make_radar, make_
 @pytest.mark.parametrize(
     ("params", "taps", "message"),
     [
-        ({}, 19, r"cfar.ca: 12 training_taps and 2 guard_taps on each side need 16 taps, but 15 of the 19 taps"),
+        ({}, 19, r"cfar.ca: 12 training taps and 2 guard taps on each side need 16 taps, but 15 of the 19 taps"),
         ({"skip_taps": 50}, 50, "leaves nothing to search"),
     ],
 )
