@@ -90,11 +90,11 @@ _SCORES = (
     ("precision", "precision", ""),
     ("recall", "recall", ""),
     ("f1", "F1", ""),
-    ("mae_m", "MAE", "m"),
-    ("p90_m", "P90", "m"),
-    ("p95_m", "P95", "m"),
-    ("sd_m", "SD", "m"),
-    ("matched_mae_m", "MAE of true positives", "m"),
+    ("mae_m", "MAE", "cm"),
+    ("p90_m", "P90", "cm"),
+    ("p95_m", "P95", "cm"),
+    ("sd_m", "SD", "cm"),
+    ("matched_mae_m", "MAE of true positives", "cm"),
     ("chance_recall", "recall by chance", ""),
     ("false_alarms_per_minute", "false alarms a minute", ""),
     ("tp", "true positives", None),
@@ -108,7 +108,10 @@ _SCORES = (
 def _score(block: Mapping[str, Any], key: str, unit: str | None) -> str:
     if unit is None:
         return str(block[key])
-    return number(block[key], unit, reason=_why_undefined(block, key))
+    value = block[key]
+    if unit == "cm":
+        return number(None if value is None else value * 100, unit, 1, reason=_why_undefined(block, key))
+    return number(value, unit, reason=_why_undefined(block, key))
 
 
 def _why_undefined(block: Mapping[str, Any], key: str) -> str:
@@ -144,10 +147,10 @@ def print_leaderboard(report: Report) -> None:
         title = f"{about['dataset']}, {about['source'].upper()}"
         if not about["exhaustive"]:
             open_world.add(title)
-        numbers = [_short(found[name].value, digits) for name, _, digits in _LEADERBOARD]
+        numbers = [_short(found[name].value * scale, digits) for name, _, scale, digits in _LEADERBOARD]
         others = [_short(about["p50_us"], 0), _short(about["chance_recall"], 3)]
         groups.setdefault(title, []).append([about["scoring"], about["table"], about["detector"], *numbers, *others])
-    columns = ["scoring", "after", "detector", *(title for _, title, _ in _LEADERBOARD), "p50 (us)", "chance recall"]
+    columns = ["scoring", "after", "detector", *(title for _, title, _, _ in _LEADERBOARD), "p50 (us)", "chance recall"]
     for title, rows in groups.items():
         shown = slice(None) if title in open_world else slice(-1)
         print_table(title, columns[shown], [row[shown] for row in rows])
@@ -167,13 +170,13 @@ def print_leaderboard(report: Report) -> None:
 
 
 _LEADERBOARD = (
-    ("precision", "precision", 3),
-    ("recall", "recall", 3),
-    ("f1", "F1", 3),
-    ("mae", "MAE (m)", 3),
-    ("p90", "P90 (m)", 3),
-    ("p95", "P95 (m)", 3),
-    ("sd", "SD (m)", 3),
+    ("precision", "precision", 1, 3),
+    ("recall", "recall", 1, 3),
+    ("f1", "F1", 1, 3),
+    ("mae", "MAE (cm)", 100, 1),
+    ("p90", "P90 (cm)", 100, 1),
+    ("p95", "P95 (cm)", 100, 1),
+    ("sd", "SD (cm)", 100, 1),
 )
 
 
