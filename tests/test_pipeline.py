@@ -215,8 +215,7 @@ def test_a_stage_whose_need_the_capture_lacks_is_refused(approach_without_sts):
 def test_an_optional_stage_is_left_out_with_a_note_and_so_is_what_depends_on_it(approach_without_sts, approach):
     pipeline = detector("every", "phase?", "after_phase?")
     assert pipeline.open(approach_without_sts).notes == (
-        "phase-1 left out: the capture has no STS responses of two antennas",
-        "after_phase-2 left out: the capture has no pdoa_rad",
+        "left out, as the capture has no STS responses of two antennas: phase-1, after_phase-2",
     )
     part = dataclasses.replace(approach, name="part")
     stream = pipeline.open(part)
@@ -226,7 +225,7 @@ def test_an_optional_stage_is_left_out_with_a_note_and_so_is_what_depends_on_it(
 
 
 def test_what_depends_on_a_stage_left_out_must_be_optional_too(approach_without_sts):
-    with pytest.raises(ConfigError, match=r"step 'after_phase-2': capture .* has no pdoa_rad"):
+    with pytest.raises(ConfigError, match=r"step 'after_phase-2': capture .* has no STS responses"):
         detector("every", "phase?", "after_phase").open(approach_without_sts)
 
 
@@ -371,3 +370,44 @@ def test_a_detector_is_loaded_from_a_file_with_changes(tmp_path):
     found = load_detector(path, changes={"pipeline.t.at_least.params.minimum": 1e9})
     assert len(found.run(capture_of())) == 0
     assert repr(found) == "Pipeline(mine: t.every -> t.at_least)"
+
+
+# Steps that a file leaves to be understood.
+
+
+def test_stages_that_a_file_leaves_out_are_put_in_with_a_note(approach):
+    short = detector_from_yaml(
+        "{schema: 1, name: short, pipeline: [{use: peaks}, {use: filter.prominence, params: {minimum: 0.1}}, "
+        "{use: filter.snr, params: {minimum_db: 20}}, {use: range}]}"
+    )
+    labels = [step.label for step in short.config.steps]
+    before_peaks, before_snr = (
+        ["profile.minmax", "peaks"],
+        ["first_path.crest", "noise_floor", "score.snr", "filter.snr"],
+    )
+    assert labels == [*before_peaks, "filter.prominence", *before_snr, "range"]
+    found = short.run(approach)
+    assert np.isfinite(found.range_m).all()
+    assert "profile.minmax: put before 'peaks', which needs it, with its defaults" in found.notes
+
+
+def test_channels_of_a_parameter_may_be_numbers_or_text(approach):
+    for key in ("9", "'9'"):
+        minimum = f"{{by_channel: {{{key}: 0.2}}}}"
+        steps = f"[{{use: peaks}}, {{use: filter.prominence, params: {{minimum: {minimum}}}}}]"
+        pipeline = detector_from_yaml(f"{{schema: 1, name: a, pipeline: {steps}}}")
+        assert pipeline.config.steps[-1].params_for(9) == ({"minimum": 0.2}, [])
+
+
+def test_an_empty_table_has_the_columns_of_a_full_one(approach):
+    paper = load_detector("paper")
+    nothing = dataclasses.replace(
+        approach,
+        trajectory=Trajectory(np.empty(0), np.empty((0, 3)), np.empty(0)),
+        **{name: getattr(approach, name)[:0] for name in ("preamble", "sts1", "sts2")},
+        **{
+            name: getattr(approach, name)[:0]
+            for name in ("first_path_index", "first_path_index_sts1", "first_path_index_sts2")
+        },
+    )
+    assert set(paper.run(nothing).columns) == set(paper.run(approach).columns)

@@ -16,7 +16,7 @@ import numpy as np
 from uwbbench import registry
 from uwbbench.api.block import Block
 from uwbbench.api.capture import Capture, CaptureHeader
-from uwbbench.api.detections import Detections
+from uwbbench.api.detections import COLUMNS, Detections
 from uwbbench.api.errors import ConfigError, PluginError
 from uwbbench.api.frames import Frames
 from uwbbench.api.stage import Filter, Stage
@@ -77,6 +77,11 @@ class Stream:
                     self.chain[opened.label] += len(tail.detections)
                 out.append(self._emit(self._through(tail, index + 1)))
         return Detections.join(out).annotated(notes=self.notes)
+
+    @property
+    def ports(self) -> frozenset[str]:
+        """All that the stages produce."""
+        return frozenset().union(*(stage.produces for stage in self.stages))
 
     @property
     def stages(self) -> tuple[Stage[Any], ...]:
@@ -192,14 +197,22 @@ class Pipeline:
         }
         available = {"frames"}
         stages, notes = [], []
+        missing: dict[str, str] = {}  # port that a step left out would have made: what the capture lacks for it
+        left_out: dict[str, list[str]] = {}
         for step in self.config.steps:
             cls = registry.load("stages", step.use)
             params, fallen = step.params_for(radar.channel)
+            if step.implied_by:
+                notes.append(f"{step.label}: put before '{step.implied_by}', which needs it, with its defaults")
             given = f"channel {radar.channel}" if radar.channel else "a capture without channel"
             notes += [f"{step.label}: no {name} for {given}, used {params[name]}" for name in fallen]
-            lacks = [_NEEDS.get(need, need) for need in sorted(cls.needs - has)] + sorted(cls.consumes - available)
+            lacks = [_NEEDS.get(need, need) for need in sorted(cls.needs - has)]
+            lacks += [missing.get(port, port) for port in sorted(cls.consumes - available)]
+            lacks = list(dict.fromkeys(lacks))
             if lacks and step.optional:
-                notes.append(f"{step.label} left out: the capture has no {', no '.join(lacks)}")
+                reason = ", no ".join(lacks)
+                left_out.setdefault(reason, []).append(step.label)
+                missing |= dict.fromkeys(cls.produces, reason)
                 continue
             if lacks:
                 where = f"detector '{self.name}', step '{step.label}'"
@@ -210,6 +223,7 @@ class Pipeline:
                 stage.show_truth(capture.truth, capture.trajectory)
             available = (available - stage.removes) | stage.produces
             stages.append(_Opened(step.label, stage))
+        notes += [f"left out, as the capture has no {reason}: {', '.join(names)}" for reason, names in left_out.items()]
         return Stream(stages, notes, audit=audit)
 
     def run(self, capture: Capture, *, candidates: bool = False) -> Detections:
@@ -229,6 +243,8 @@ class Pipeline:
         stream = self.open(capture, audit=candidates)
         parts = [stream.step(frames) for frames in capture.blocks(BATCH_FRAMES)]
         found = Detections.join([*parts, stream.flush()])
+        if not len(found):  # an empty table has the columns that a full one would have
+            found = found.with_columns(**{name: () for name in COLUMNS if name in stream.ports})
         facts: dict[str, Any] = {"chain": stream.chain, "notes": stream.notes}
         if candidates:
             return found.annotated(candidates=_candidates(found, stream.rejected), **facts)
@@ -246,10 +262,7 @@ class Pipeline:
             module = sys.modules[registry.load("stages", step.use).__module__]
             content = Path(module.__file__).read_bytes() if module.__file__ else b""
             sources[step.use] = hashlib.sha256(content).hexdigest()
-        resolved = json.loads(
-            json.dumps(self.config.to_dict())
-        )  # channel numbers become text, which sorts with "other"
-        text = json.dumps({"detector": resolved, "sources": sources}, sort_keys=True)
+        text = json.dumps({"detector": self.config.to_dict(), "sources": sources}, sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()
 
 

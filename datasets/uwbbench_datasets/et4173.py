@@ -153,6 +153,7 @@ class Et4173Walk(Dataset[Et4173WalkParams]):
             frame_rate_hz=mean_frame_rate_hz(timestamp_s, path),
             taps=samples.shape[1],
             samples="rf",
+            receiver=name,
             first_tap_delay_s=2 * self.params.range_offset_m / SPEED_OF_LIGHT_M_S,
         )
         person = Obstacle("person", "person", self._path(frames)[:, None, :])
@@ -167,7 +168,7 @@ class Et4173Walk(Dataset[Et4173WalkParams]):
             citation=self.card.citation,
             description="One walking person; truth is the leading edge, its range offset and corner times are fitted.",
             preamble=samples.astype(np.float32),
-            receivers=(radar.receiver,),
+            receivers=tuple(self.nodes_m),
         )
 
     def _path(self, frames: int) -> FloatArray:

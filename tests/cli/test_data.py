@@ -26,9 +26,11 @@ def test_convert_writes_what_the_adapter_reads(uwbbench, tmp_path: Path) -> None
     assert package.open_capture(tmp_path / "new/folder/plate.h5").sha256 == expected.sha256
 
 
-def test_of_several_captures_one_is_chosen(uwbbench, tmp_path: Path) -> None:
+def test_several_runs_get_a_file_each_and_one_can_be_chosen(uwbbench, tmp_path: Path) -> None:
     words = ("convert", ".", "--dataset", "approach", "--set", "runs=2", "-o", "plate.h5")
-    assert "approach-ch9-metal-1, approach-ch9-metal-2" in uwbbench(*words, code=2).stderr
+    uwbbench(*words)
+    for run in ("approach-ch9-metal-1", "approach-ch9-metal-2"):
+        assert package.open_capture(tmp_path / f"plate-{run}.h5").name == run
     uwbbench(*words, "--capture", "approach-ch9-metal-2")
     assert package.open_capture(tmp_path / "plate.h5").name == "approach-ch9-metal-2"
     assert "Did you mean 'approach-ch9-metal-2'?" in uwbbench(*words, "--capture", "aproach-ch9-metal2", code=2).stderr
@@ -62,6 +64,13 @@ def test_a_measured_recording_is_converted_from_its_folder(uwbbench, data_dir: P
     for source in (data_dir / "et4173-walk", data_dir / "et4173-walk" / "101_P1.mat"):
         uwbbench("convert", source, "--dataset", "et4173-walk", "--capture", "101", "-o", "walk.h5")
         assert package.open_capture(tmp_path / "walk.h5").source == "measured"
+
+
+def test_the_receivers_of_one_run_share_a_file(uwbbench, data_dir: Path, tmp_path: Path) -> None:
+    uwbbench("convert", data_dir / "et4173-walk", "--dataset", "et4173-walk", "-o", "walk.h5")
+    node = package.open_capture(tmp_path / "walk.h5", receiver="102")
+    assert node.receivers == ("101", "102")
+    assert node.trajectory.position_m[0].tolist() == [2.0, 2.0, 0.0]
 
 
 @pytest.mark.parametrize(

@@ -78,8 +78,11 @@ def test_captures_with_invalid_frames_or_none_are_scored(uwbbench, capture_with_
 
 def test_paper_notes_what_it_left_out_without_sts(uwbbench, capture_with_nan: Path) -> None:
     found = json.loads(uwbbench("score", capture_with_nan, "-d", "paper", "--no-latency", "--json").stdout)
-    assert any("pdoa left out" in note for note in found["notes"])
-    assert "note: pdoa left out" in uwbbench("score", capture_with_nan, "-d", "paper", "--no-latency").stderr
+    left_out = "left out, as the capture has no STS responses of two antennas: pdoa, filter.pdoa"
+    assert any(note.startswith(left_out) for note in found["notes"])
+    text = uwbbench("score", capture_with_nan, "-d", "paper", "--no-latency").stderr
+    assert f"note: {left_out}" in text
+    assert "frames are invalid" in text
 
 
 @pytest.mark.parametrize(
@@ -194,3 +197,10 @@ def test_nothing_is_calibrated_without_truth_or_detections(uwbbench, capture, ca
     assert "0 detections" in uwbbench("calibrate", capture, "-d", "null", "-o", "x.yaml", code=2).stderr
     assert ".yaml or .yml" in uwbbench("calibrate", capture, "-d", "paper", "-o", "x.json", code=2).stderr
     assert not (tmp_path / "x.yaml").exists()
+
+
+def test_detections_are_written_in_the_order_of_frames(uwbbench, capture: Path, tmp_path: Path) -> None:
+    uwbbench("detect", capture, "-d", "paper", "-o", "found.csv")
+    frames = [int(line.split(",")[0]) for line in (tmp_path / "found.csv").read_text().splitlines()[1:]]
+    assert frames == sorted(frames)
+    assert frames

@@ -149,8 +149,8 @@ def test_a_run_in_which_everything_failed_still_has_a_report(run: Run, tmp_path:
 def test_notes_of_detectors_reach_the_reader(run: Run) -> None:
     datasets = "[{use: approach, params: {speed_m_s: 3.0, sts: false, runs: 2}}]"
     report = Report(run("[paper]", datasets, scoring="frame"))
-    assert any("pdoa left out" in note and "(2 captures)" in note for note in report.notes)
-    assert "pdoa left out" in markdown(report)
+    assert any(": pdoa, filter.pdoa" in note and "(2 captures)" in note for note in report.notes)
+    assert "left out, as the capture has no STS" in markdown(report)
 
 
 def test_extra_metrics_are_columns(run: Run) -> None:

@@ -236,11 +236,19 @@ def test_latency_is_measured_after_accuracy_and_stored_with_every_call(
     assert np.median(times_us) == entry.facts["p50_us"]
 
 
-def test_a_latency_pass_that_fails_is_a_failed_row(
+def test_a_latency_pass_that_fails_is_a_failed_row(make_experiment: MakeExperiment, tmp_path: Path) -> None:
+    experiment = make_experiment("['null']", latency="{reference: null, timeout_s: 0.01}")
+    folder = run_experiment(experiment, tmp_path / "run", jobs=1)
+    (entry,) = [entry for entry in folder.entries() if entry.kind == "latency"]
+    assert entry.status == "failed"
+    assert "LatencyError" in entry.traceback
+
+
+def test_what_cannot_be_run_is_not_timed(
     make_experiment: MakeExperiment, detector_file: DetectorFile, tmp_path: Path, misbehaving: Path
 ) -> None:
     bad = detector_file("bad", "{use: misbehaving.raise}")
     folder = run_experiment(make_experiment(f"[{bad}]", latency="{reference: null}"), tmp_path / "run", jobs=1)
-    (entry,) = [entry for entry in folder.entries() if entry.kind == "latency"]
-    assert entry.status == "failed"
-    assert "ValueError: no luck" in entry.traceback
+    accuracy, latency = folder.entries()
+    assert "ValueError: no luck" in accuracy.traceback
+    assert (latency.status, latency.reason) == ("failed", "not timed, as it could not be run")

@@ -10,6 +10,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pandas as pd
+import psutil
 import pytest
 
 from uwbbench.api import StoreError, write_capture
@@ -159,3 +160,25 @@ def test_a_parallel_run_that_is_killed_or_interrupted_can_be_continued(
     folder = run_experiment(experiment, tmp_path / "run", jobs=1, resume=True, progress=seen.append)
     assert len(seen) == 6 - len(done)
     assert {entry.status for entry in folder.entries()} == {"done"}
+
+
+@pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGTERM])
+def test_workers_end_with_the_run_that_started_them(
+    make_experiment: MakeExperiment, detector_file: DetectorFile, tmp_path: Path, misbehaving: Path, how: signal.Signals
+) -> None:
+    slow = detector_file("slow", f"{{use: misbehaving.wait, params: {{file: '{tmp_path / 'never'}'}}}}")
+    make_experiment(f"[oracle, {slow}]", datasets=THREE)
+    (tmp_path / "go.py").write_text(SCRIPT)
+    command = [sys.executable, tmp_path / "go.py", tmp_path / "tiny.yaml", tmp_path / "run", "2"]
+    process = subprocess.Popen(command, start_new_session=True, stderr=subprocess.DEVNULL)
+    journal = tmp_path / "run" / "journal.jsonl"
+    deadline = time.monotonic() + 60
+    while not journal.exists() or not journal.read_bytes().endswith(b"\n"):
+        assert time.monotonic() < deadline, "no unit finished"
+        time.sleep(0.05)
+    workers = psutil.Process(process.pid).children(recursive=True)
+    assert workers
+    process.send_signal(how)
+    process.wait(timeout=30)
+    _, alive = psutil.wait_procs(workers, timeout=20)
+    assert not alive

@@ -197,7 +197,9 @@ class Capture(CaptureHeader):
         try:
             return np.asarray(getattr(self, name)[start:stop])
         except (OSError, RuntimeError) as error:  # a compressed array is checked only when it is read
-            raise CaptureError(f"capture '{self.name}': {name}: cannot be read, damaged file ({error})") from error
+            file = getattr(getattr(self, name), "file", None)
+            where = f"{file.filename}: {getattr(self, name).name}" if file else f"capture '{self.name}': {name}"
+            raise CaptureError(f"{where}: cannot be read, damaged file ({error})") from error
 
     def blocks(self, size: int) -> Iterator[Frames]:
         """Frames in consecutive blocks of ``size``; the last may be shorter."""

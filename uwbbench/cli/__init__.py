@@ -36,6 +36,10 @@ class _Commands(TyperGroup):
         except BrokenPipeError:  # the reader, such as `head`, has all it wants
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
             return None
+        except OSError as error:  # stdout on a full disk; files have messages of their own
+            typer.echo(f"error: the output cannot be written: {error.strerror or error}", err=True)
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            raise typer.Exit(USAGE_ERROR) from error
         return result
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -11,6 +13,7 @@ from uwbbench.api.errors import ConfigError, nearest
 from uwbbench.cli import options
 
 if TYPE_CHECKING:
+    from uwbbench.api.capture import Capture
     from uwbbench.api.dataset import Dataset
 
 
@@ -18,26 +21,45 @@ def convert(
     source: Annotated[Path, typer.Argument(metavar="SOURCE", help="Recording: a file, or the folder that holds it.")],
     dataset: Annotated[str, typer.Option("--dataset", metavar="NAME", help="Adapter that reads it.")],
     output: Annotated[Path, typer.Option("--output", "-o", metavar="FILE.h5", help="Capture file to write.")],
-    capture: Annotated[
-        str | None, typer.Option(metavar="NAME", help="Which capture, if there are several.", show_default=False)
-    ] = None,
+    capture: Annotated[str | None, typer.Option(metavar="NAME", help="Only this capture.", show_default=False)] = None,
     settings: options.Settings = None,
 ) -> None:
-    """Convert a recording into a capture file."""
+    """Convert a recording into a capture file.
+
+    The receivers of one run share the file. Several runs get a file each, FILE-NAME.h5; --capture chooses one.
+    """
     from uwbbench.api.capture_file import write_capture
 
     options.format_of(output, ".h5")
     opened = _open(source, dataset, settings)
     names = opened.names()
-    if capture is None and len(names) != 1:
-        raise ConfigError(f"{source}: holds {len(names)} captures; choose one with --capture: {', '.join(names)}")
-    chosen = capture or names[0]
-    if chosen not in names:
-        raise ConfigError(f"{source}: no capture '{chosen}'.{nearest(chosen, names)}")
-    found = opened.open(chosen)
-    write_capture(output, found)
-    label = "simulated capture" if found.source == "simulated" else "capture"
-    typer.echo(f"{label} '{found.name}', {len(found)} frames of {found.radar.taps} taps, written to {output}", err=True)
+    if capture is not None and capture not in names:
+        raise ConfigError(f"{source}: no capture '{capture}'.{nearest(capture, names)}")
+    runs: dict[str, list[Capture]] = {}
+    for name in [capture] if capture is not None else names:
+        found = opened.open(name)
+        runs.setdefault(_run_of(name, found), []).append(found)
+    for run, captures in runs.items():
+        path = output if len(runs) == 1 else output.with_name(f"{output.stem}-{_file_part(run)}{output.suffix}")
+        if len(captures) > 1:
+            captures = [replace(found, name=run or path.stem) for found in captures]
+        write_capture(path, *captures)
+        for found in captures:
+            label = "simulated capture" if found.source == "simulated" else "capture"
+            size = f"{len(found)} frames of {found.radar.taps} taps"
+            receiver = f", receiver '{found.radar.receiver}'" if len(captures) > 1 else ""
+            typer.echo(f"{label} '{found.name}'{receiver}, {size}, written to {path}", err=True)
+
+
+def _run_of(name: str, found: Capture) -> str:
+    """What the captures of one run, which share a file, have in common: their names without the receiver."""
+    run, _, last = name.rpartition("/")
+    return run if last == found.radar.receiver else name
+
+
+def _file_part(name: str) -> str:
+    """Name with nothing in it that a file name cannot hold."""
+    return re.sub(r"[^\w.-]+", "-", name)[:100]
 
 
 def _open(source: Path, name: str, settings: list[str] | None) -> Dataset[Any]:
@@ -82,7 +104,5 @@ def fetch(
 
 def register(app: typer.Typer) -> None:
     """Add these commands."""
-    app.command(epilog="Example: uwbbench convert data/et4173-walk --dataset et4173-walk --capture 101 -o walk.h5")(
-        convert
-    )
+    app.command(epilog="Example: uwbbench convert data/et4173-walk --dataset et4173-walk -o walk.h5")(convert)
     app.command(epilog="Example: uwbbench fetch pulson440-rail")(fetch)

@@ -37,6 +37,8 @@ def score(
     if opened.truth is None:
         raise ScoringError(f"{capture}: the capture has no ground truth; it can be detected on, but not scored")
     found = pipeline.run(opened, candidates=scoring is options.Scoring.PEAK)
+    invalid = len(opened) - len(found.processed)
+    notes = [f"{invalid} of {len(opened)} frames are invalid (a sample is not finite): not scored"] if invalid else []
     tables = uwbbench.score(found, opened, scoring=scoring.value, gate_m=gate_m).to_dict()
     result = {
         "detector": pipeline.name,
@@ -49,7 +51,8 @@ def score(
         "gate_m": tables["gate_m"],
         "receiver": opened.radar.receiver,
         "source": opened.source,
-        "notes": list(found.notes),
+        "invalid_frames": invalid,
+        "notes": [*notes, *found.notes],
     }
     if json:
         render.print_json(plain(result))
@@ -92,7 +95,7 @@ def detect(
     suffix = options.format_of(output, ".csv", ".parquet")
     opened, pipeline = _open(capture, receiver, detector, settings)
     found = pipeline.run(opened)
-    table = found.to_pandas()
+    table = found.to_pandas().sort_values("frame", kind="stable")  # clustering hands some out later than others
     with replacing(output) as partial:
         if suffix == ".csv":
             table.to_csv(partial, index=False)

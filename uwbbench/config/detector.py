@@ -16,6 +16,15 @@ from uwbbench.api.yaml_file import YamlFile, parse_yaml, read_yaml
 from uwbbench.config.locate import find_config
 from uwbbench.config.override import merged, with_values
 
+IMPLIED = {
+    "profile": "profile.minmax",
+    "first_path": "first_path.crest",
+    "noise": "noise_floor",
+    "score_db": "score.snr",
+    "range_m": "range",
+}
+"""Stages that are put in, with their defaults and a note, where a step uses a port that no step of the file makes."""
+
 BY_CHANNEL = "by_channel"
 """Key of a parameter whose value depends on the capture's channel: ``{by_channel: {5: 1.0, 9: 0.2, other: 0.2}}``."""
 
@@ -62,6 +71,8 @@ class Step:
         May be left out where the capture lacks what the stage needs.
     place : str
         File, line and key it was read from, for messages.
+    implied_by : str
+        Label of the step that this one was put in for; empty where the file names it.
     """
 
     use: str
@@ -69,6 +80,7 @@ class Step:
     params: dict[str, Any] = field(default_factory=dict)
     optional: bool = False
     place: str = field(default="", compare=False)
+    implied_by: str = field(default="", compare=False)
 
     def params_for(self, channel: int | None) -> tuple[dict[str, Any], list[str]]:
         """Parameters for a channel, and the names of those that fell back to ``other``."""
@@ -76,8 +88,8 @@ class Step:
         for name, value in self.params.items():
             if isinstance(value, dict) and set(value) == {BY_CHANNEL}:
                 table = value[BY_CHANNEL]
-                if channel in table:
-                    value = table[channel]
+                if str(channel) in table:
+                    value = table[str(channel)]
                 elif "other" in table:
                     value = table["other"]
                     fallen.append(name)
@@ -176,10 +188,49 @@ def check_detector(data: Mapping[str, Any], source: YamlFile) -> DetectorConfig:
             raise ConfigError(
                 f"{source.place(('pipeline', index))}: step '{label}' appears twice; name one of them with 'as'"
             )
-        step = Step(item.use, label, item.params, item.optional, source.place(("pipeline", index)))
+        params = _with_named_channels(item.params, source, index)
+        step = Step(item.use, label, params, item.optional, source.place(("pipeline", index)))
         _check_params(step, source, index)
         steps.append(step)
-    return DetectorConfig(model.name, tuple(steps), model.description, model.citation, model.fidelity)
+    whole = tuple(_completed(steps))
+    return DetectorConfig(model.name, whole, model.description, model.citation, model.fidelity)
+
+
+def _completed(steps: list[Step]) -> list[Step]:
+    """Steps with the implied ones put in directly before their first user."""
+    made = {"frames"}
+    for step in steps:
+        made |= registry.load("stages", step.use).produces
+    taken = {step.label for step in steps}
+    whole: list[Step] = []
+
+    def put(step: Step) -> None:
+        for port in sorted(registry.load("stages", step.use).consumes - made):
+            use = IMPLIED.get(port)
+            if use in registry.entries("stages") and use not in taken:
+                made.update(registry.load("stages", use).produces)
+                taken.add(use)
+                put(Step(use, use, place=step.place, implied_by=step.label))
+        whole.append(step)
+
+    for step in steps:
+        put(step)
+    return whole
+
+
+def _with_named_channels(params: Mapping[str, Any], source: YamlFile, index: int) -> dict[str, Any]:
+    """Parameters whose channels are text, whether the file has numbers or text."""
+    named = {}
+    for name, value in params.items():
+        if isinstance(value, dict) and BY_CHANNEL in value:
+            table = value[BY_CHANNEL]
+            wrong = set(value) != {BY_CHANNEL} or not isinstance(table, dict) or not table
+            if wrong or any(key != "other" and not str(key).isdecimal() for key in table):
+                place = source.place(("pipeline", index, "params", name))
+                raise ConfigError(f"{place}: by_channel expects channel numbers and 'other' as keys")
+            value = {BY_CHANNEL: {str(key): choice for key, choice in table.items()}}
+        named[name] = value
+    return named
 
 
 def _check_params(step: Step, source: YamlFile, index: int) -> None:
@@ -189,30 +240,14 @@ def _check_params(step: Step, source: YamlFile, index: int) -> None:
         stage = registry.load("stages", step.use)
     except PluginError as error:
         raise PluginError(f"{source.place((*at, 'use'))}: {error}") from error
-    channels: set[Any] = set()
-    for name, value in step.params.items():
-        if isinstance(value, dict) and BY_CHANNEL in value:
-            table = value[BY_CHANNEL]
-            wrong = set(value) != {BY_CHANNEL} or not isinstance(table, dict) or not table
-            if wrong or any(key != "other" and not isinstance(key, int) for key in table):
-                place = source.place((*at, "params", name))
-                raise ConfigError(f"{place}: by_channel expects channel numbers and 'other' as keys")
-            channels |= set(table) - {"other"}
-    for channel in channels or {None}:
+    tables = [value[BY_CHANNEL] for value in step.params.values() if isinstance(value, dict) and BY_CHANNEL in value]
+    named = {int(key) for table in tables for key in table if key != "other"}
+    channels: list[int | None] = [*sorted(named)]
+    if all("other" in table for table in tables):
+        channels.append(None)
+    for channel in channels:
         try:
             params, _ = step.params_for(channel)
         except ConfigError as error:
             raise ConfigError(f"{source.place((*at, 'params'))}: {error}") from error
         checked(stage.params_type(), params, source, (*at, "params"))
-    if channels:
-        others, _ = step.params_for(None) if _has_other(step) else ({}, [])
-        if others:
-            checked(stage.params_type(), others, source, (*at, "params"))
-
-
-def _has_other(step: Step) -> bool:
-    return all(
-        "other" in value[BY_CHANNEL]
-        for value in step.params.values()
-        if isinstance(value, dict) and BY_CHANNEL in value
-    )

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import dataclasses
+import os
 import re
+import signal
+import threading
 import time
 import traceback
 import uuid
 from collections.abc import Callable, Iterator
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
@@ -101,10 +104,24 @@ def run_experiment(
     folder = _resumed(experiment, out, workers) if resume else _created(experiment, out, workers)
     todo = plan(experiment)
     try:
-        _Run(folder, experiment, todo, workers, progress).carry_out()
+        with _terminable():
+            _Run(folder, experiment, todo, workers, progress).carry_out()
     except KeyboardInterrupt:
         raise Interrupted(folder.path) from None
     return folder
+
+
+@contextmanager
+def _terminable() -> Iterator[None]:
+    """Let a request to terminate end a run as the interrupt key does: results kept, workers gone."""
+    if threading.current_thread() is not threading.main_thread():  # signals reach the main thread only
+        yield
+        return
+    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
 
 
 def _created(experiment: Experiment, out: Path | None, jobs: int) -> RunFolder:
@@ -171,8 +188,17 @@ class _Run:
             self._write_scores()
         contents = self._contents()
         self.folder.update_manifest(data=contents)
+        failed = {
+            (entry.detector, entry.dataset, entry.capture)
+            for entry in self.folder.entries()
+            if entry.kind == "accuracy" and entry.status == "failed"
+        }
         for unit in pending:
-            if unit.kind == "latency":
+            if unit.kind != "latency":
+                continue
+            if (unit.detector.name, unit.dataset, unit.ref.name) in failed:
+                self._journal(entry_of(unit, "failed", reason="not timed, as it could not be run"))
+            else:
                 self._time(unit, contents.get(unit.capture_id, ""))
 
     def _pending(self, before: dict[str, Entry]) -> list[Unit]:
@@ -189,7 +215,7 @@ class _Run:
         return [unit for unit in self.plan.units if unit.id not in same]
 
     def _job(self, unit: Unit) -> Job:
-        return Job(unit, self.rules, self.session)
+        return Job(unit, self.rules, self.session, os.getpid())
 
     def _basis(self, unit: Unit) -> Any:
         """What a result depends on besides detector and capture. Times also depend on the machine."""

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
+import os
+import signal
+import threading
 import time
 import traceback
 from collections.abc import Sequence
@@ -30,11 +33,14 @@ class Job:
     rules : tuple of ScoringRules
     session : str
         Distinct for each run: a worker that outlives a run must not use its captures for the next.
+    parent : int
+        The process that runs the experiment.
     """
 
     unit: Unit
     rules: tuple[ScoringRules, ...]
     session: str
+    parent: int
 
 
 @dataclass(frozen=True)
@@ -80,10 +86,26 @@ def identity_of(unit: Unit, sha256: str, basis: Any) -> str:
     return digest([unit.kind, Pipeline(unit.detector).identity, sha256, basis])
 
 
+def die_with(parent: int) -> None:
+    """Make a worker leave the interrupt key to its parent, and end when the parent has ended, however it ended."""
+    if os.getpid() == parent or threading.current_thread() is not threading.main_thread():
+        return
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+    def watch() -> None:
+        while os.getppid() == parent:
+            time.sleep(1.0)
+        os._exit(1)
+
+    if not any(thread.name == "watch-parent" for thread in threading.enumerate()):
+        threading.Thread(target=watch, name="watch-parent", daemon=True).start()
+
+
 def run_unit(job: Job) -> Finished:
     """Detect and score on one capture with one thread."""
     from threadpoolctl import threadpool_limits
 
+    die_with(job.parent)
     started = time.perf_counter()
     unit = job.unit
     try:
