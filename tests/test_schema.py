@@ -11,7 +11,7 @@ from uwbbench import registry
 from uwbbench.api import PluginError
 from uwbbench.api.yaml_file import parse_yaml, read_yaml
 from uwbbench.config.locate import shipped
-from uwbbench.schema import detector_schema, experiment_schema
+from uwbbench.schema import detector_schema, experiment_schema, scene_schema
 
 STEPS = "schema: 1\nname: x\npipeline:\n  - {use: profile.amplitude}\n"
 EXPERIMENT = "schema: 1\ndetectors: [paper]\ndatasets:\n  - {use: approach}\n"
@@ -36,8 +36,13 @@ def experiment() -> dict[str, Any]:
     return experiment_schema()
 
 
-def test_both_schemas_are_valid_schemas_of_plain_json(detector, experiment) -> None:
-    for schema in (detector, experiment):
+@pytest.fixture(scope="module")
+def scene() -> dict[str, Any]:
+    return scene_schema()
+
+
+def test_the_schemas_are_valid_schemas_of_plain_json(detector, experiment, scene) -> None:
+    for schema in (detector, experiment, scene):
         jsonschema.Draft202012Validator.check_schema(json.loads(json.dumps(schema, allow_nan=False)))
 
 
@@ -51,6 +56,19 @@ def test_shipped_detectors_fit(detector, name) -> None:
 def test_shipped_experiments_fit(experiment, name) -> None:
     data = as_an_editor_sees_it(read_yaml(shipped("experiments")[name]).data)
     jsonschema.Draft202012Validator(experiment).validate(data)
+
+
+@pytest.mark.parametrize("name", sorted(shipped("scenes")))
+def test_shipped_scenes_fit(scene, name) -> None:
+    data = as_an_editor_sees_it(read_yaml(shipped("scenes")[name]).data)
+    jsonschema.Draft202012Validator(scene).validate(data)
+
+
+@pytest.mark.parametrize("term", ["{use: noisy}", "{use: noise, params: {snr: 3}}", "{params: {}}"])
+def test_a_scenes_terms_follow_from_their_use(scene, term) -> None:
+    text = "schema: 1\ntrajectory: {kind: static, duration_s: 1}\nterms: [TERM]\n"
+    assert not errors(scene, text.replace("TERM", "{use: noise, params: {snr_db: 3}}"))
+    assert errors(scene, text.replace("TERM", term))
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,6 @@
 """Finding plugins by name, without importing any before one is asked for.
 
-Plugins are entry points of four groups: stages, datasets and metrics are classes; a detector is a YAML file inside a
+Plugins are entry points of five groups: stages, datasets, metrics and terms are classes; a detector is a YAML file in a
 package, named ``package.module:file.yaml``. Built-in plugins are registered in the same way.
 """
 
@@ -16,8 +16,8 @@ from typing import Any, Literal
 
 from uwbbench.api.errors import PluginError, nearest
 
-Kind = Literal["stages", "datasets", "metrics", "detectors"]
-KINDS: tuple[Kind, ...] = ("stages", "detectors", "datasets", "metrics")
+Kind = Literal["stages", "datasets", "metrics", "terms", "detectors"]
+KINDS: tuple[Kind, ...] = ("stages", "detectors", "datasets", "metrics", "terms")
 
 
 @dataclass(frozen=True)
@@ -78,7 +78,7 @@ def entry(kind: Kind, name: str) -> Entry:
 
 
 @cache
-def load(kind: Literal["stages", "datasets", "metrics"], name: str) -> type[Any]:
+def load(kind: Literal["stages", "datasets", "metrics", "terms"], name: str) -> type[Any]:
     """Class behind a name.
 
     Raises

@@ -36,8 +36,20 @@ def experiment_schema() -> Schema:
     return schema
 
 
+def scene_schema() -> Schema:
+    """JSON Schema of a scene file; each term's parameters follow from its ``use``.
+
+    Raises
+    ------
+    PluginError
+        If the dataset that reads scenes cannot be loaded.
+    """
+    simulated = registry.load("datasets", "simulated")
+    return _file_schema(simulated.scene_model, simulated.term_model, "terms", by_channel=False)
+
+
 def _file_schema(
-    model: type[BaseModel], item: type[BaseModel], kind: Literal["stages", "datasets"], *, by_channel: bool
+    model: type[BaseModel], item: type[BaseModel], kind: Literal["stages", "datasets", "terms"], *, by_channel: bool
 ) -> Schema:
     """Schema of a file, whose items of one model choose a plugin by ``use`` and hold its ``params``."""
     loaded: dict[str, type[BaseModel]] = {}
@@ -67,6 +79,8 @@ def _file_schema(
     step["allOf"] = choices
     file = definitions.pop(model.__name__)
     required = file.pop("required")
+    if "extends" not in model.model_fields:
+        return {"$schema": DIALECT, **file, "required": required, "$defs": definitions}
     inherits: Schema = {"if": {"required": ["extends"]}, "else": {"required": required}}
     inherits["dependentRequired"] = {"set": ["extends"]}
     return {"$schema": DIALECT, **file, **inherits, "$defs": definitions}

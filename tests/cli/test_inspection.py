@@ -13,7 +13,7 @@ from uwbbench.pipeline import load_detector
 # list
 
 
-@pytest.mark.parametrize("kind", ["stages", "datasets", "metrics"])
+@pytest.mark.parametrize("kind", ["stages", "datasets", "metrics", "terms"])
 def test_list_names_every_registered_plugin(uwbbench, kind) -> None:
     registered = sorted(point.name for point in entry_points(group=f"uwbbench.{kind}"))
     found = json.loads(uwbbench("list", kind, "--json").stdout)
@@ -28,7 +28,13 @@ def test_list_names_every_shipped_detector(uwbbench) -> None:
 
 
 def test_list_without_kind_has_all_kinds(uwbbench) -> None:
-    assert list(json.loads(uwbbench("list", "--json").stdout)) == ["stages", "detectors", "datasets", "metrics"]
+    assert list(json.loads(uwbbench("list", "--json").stdout)) == [
+        "stages",
+        "detectors",
+        "datasets",
+        "metrics",
+        "terms",
+    ]
 
 
 def test_list_of_an_unknown_kind_names_the_kinds(uwbbench) -> None:
@@ -52,7 +58,7 @@ def test_show_a_stage_gives_parameters_ports_and_fidelity(uwbbench) -> None:
     assert height["description"]
 
 
-@pytest.mark.parametrize("kind", ["stages", "datasets", "metrics", "detectors"])
+@pytest.mark.parametrize("kind", ["stages", "datasets", "metrics", "terms", "detectors"])
 def test_everything_listed_can_be_shown(uwbbench, kind) -> None:
     for row in json.loads(uwbbench("list", kind, "--json").stdout)[kind]:
         assert kind[:-1] in json.loads(uwbbench("show", row["name"], "--json").stdout)

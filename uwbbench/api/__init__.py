@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from uwbbench.api.metric import Metric, Outcome
     from uwbbench.api.radar import Radar
     from uwbbench.api.stage import Filter, Params, Stage, ports
+    from uwbbench.api.term import Paths, Pulse, Responses, SceneObject, Term, View
     from uwbbench.api.truth import Obstacle, Sight, Trajectory, Truth
     from uwbbench.api.yaml_file import YamlFile, read_yaml
 
@@ -55,6 +56,7 @@ _HOME = {
     "metric": ("Metric", "Outcome"),
     "radar": ("Radar",),
     "stage": ("Filter", "Params", "Stage", "ports"),
+    "term": ("Paths", "Pulse", "Responses", "SceneObject", "Term", "View"),
     "truth": ("Obstacle", "Sight", "Trajectory", "Truth"),
     "yaml_file": ("YamlFile", "read_yaml"),
 }
@@ -82,16 +84,22 @@ __all__ = [
     "Obstacle",
     "Outcome",
     "Params",
+    "Paths",
     "PluginError",
+    "Pulse",
     "Radar",
+    "Responses",
     "Samples",
+    "SceneObject",
     "ScoringError",
     "Sight",
     "Stage",
     "StoreError",
+    "Term",
     "Trajectory",
     "Truth",
     "UwbbenchError",
+    "View",
     "YamlFile",
     "analytic",
     "checked",

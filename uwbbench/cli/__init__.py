@@ -15,7 +15,7 @@ from typer.core import TyperGroup
 
 import uwbbench
 from uwbbench.api.errors import UwbbenchError
-from uwbbench.cli import data, evaluate, inspection, runs
+from uwbbench.cli import data, evaluate, inspection, plot, runs, simulate, stability
 
 USAGE_ERROR, INTERRUPTED = 2, 130
 
@@ -68,7 +68,7 @@ def _start(
     """Benchmark UWB radar detectors: the same captures, the same metrics, speed against error."""
 
 
-for _group in (runs, evaluate, inspection, data):
+for _group in (runs, evaluate, inspection, data, simulate, stability, plot):
     _group.register(app)
 
 

@@ -11,7 +11,7 @@ from uwbbench.api.errors import ConfigError, PluginError, nearest
 from uwbbench.api.yaml_file import read_yaml
 from uwbbench.config.locate import find_config, shipped
 
-_CLASSES = ("stages", "datasets", "metrics")
+_CLASSES = ("stages", "datasets", "metrics", "terms")
 
 
 def everything_named(name: str) -> dict[str, dict[str, Any]]:
@@ -31,7 +31,7 @@ def everything_named(name: str) -> dict[str, dict[str, Any]]:
         found["detector"] = _detector(name)
     if not found:
         known = [*shipped("detectors"), *(known for kind in registry.KINDS for known in registry.entries(kind))]
-        raise PluginError(f"no stage, detector, dataset or metric named '{name}'.{nearest(name, known)}")
+        raise PluginError(f"no stage, detector, dataset, metric or term named '{name}'.{nearest(name, known)}")
     return found
 
 
@@ -45,6 +45,8 @@ def _plugin(kind: Any, name: str) -> dict[str, Any]:
         card = cls.card
         facts |= {key: getattr(card, key) for key in ("title", "origin", "license", "citation", "source", "folder")}
         facts["files"] = [{"path": file.path, "sha256": file.sha256, "url": file.url} for file in card.files]
+    elif kind == "terms":
+        facts["fidelity"] = cls.fidelity
     else:
         facts |= {key: getattr(cls, key) for key in ("unit", "better", "merge", "minimum_samples")}
     if kind != "metrics":
@@ -198,13 +200,14 @@ def receiver_text(receiver: dict[str, Any]) -> dict[str, str]:
 
 
 def checked_file(path: Path) -> str:
-    """Summary of a detector or experiment file that passed all checks.
+    """Summary of a detector, experiment or scene file that passed all checks.
 
     Raises
     ------
     ConfigError, PluginError
-        If it is wrong, or neither of the two.
+        If it is wrong, or none of the three.
     """
+    from uwbbench.config.source import open_dataset
     from uwbbench.pipeline import load_detector
     from uwbbench.run.experiment import read_experiment
 
@@ -215,9 +218,13 @@ def checked_file(path: Path) -> str:
     if "pipeline" in keys or "extends" in keys:
         pipeline = load_detector(path if path.is_absolute() else Path.cwd() / path)
         return f"detector '{pipeline.name}', {len(pipeline.config.steps)} steps, fine"
-    near = [nearest(str(key), ["pipeline", "extends", "detectors", "datasets"]) for key in keys]
+    if "terms" in keys or "trajectory" in keys:
+        captures = open_dataset("simulated", {"scenes": [str(path.resolve())]}, ()).names()
+        return f"scene of {len(captures)} captures, fine"
+    near = [nearest(str(key), ["pipeline", "extends", "detectors", "datasets", "terms"]) for key in keys]
     hint = next((text for text in near if text.startswith(" Did")), "")
-    raise ConfigError(f"{path}: neither a detector ('pipeline' or 'extends') nor an experiment ('detectors').{hint}")
+    kinds = "a detector ('pipeline' or 'extends'), an experiment ('detectors') nor a scene ('terms')"
+    raise ConfigError(f"{path}: neither {kinds}.{hint}")
 
 
 def _extends_experiment(path: Path, keys: dict[str, Any]) -> bool:

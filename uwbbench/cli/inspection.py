@@ -24,6 +24,7 @@ class Kind(StrEnum):
     DETECTORS = "detectors"
     DATASETS = "datasets"
     METRICS = "metrics"
+    TERMS = "terms"
 
 
 class File(StrEnum):
@@ -31,6 +32,7 @@ class File(StrEnum):
 
     DETECTOR = "detector"
     EXPERIMENT = "experiment"
+    SCENE = "scene"
 
 
 def list_names(
@@ -60,7 +62,7 @@ def _listed(kind: Any) -> list[dict[str, str]]:
 
 
 def show(
-    name: Annotated[str, typer.Argument(help="Stage, detector, dataset or metric; or a detector file.")],
+    name: Annotated[str, typer.Argument(help="Stage, detector, dataset, metric or term; or a detector file.")],
     json: options.Json = False,
 ) -> None:
     """Explain a plugin, or print a detector as YAML."""
@@ -114,9 +116,9 @@ def _object_text(thing: dict[str, Any]) -> str:
 
 
 def validate(
-    files: Annotated[list[Path], typer.Argument(metavar="FILE...", help="Detector or experiment YAML.")],
+    files: Annotated[list[Path], typer.Argument(metavar="FILE...", help="Detector, experiment or scene YAML.")],
 ) -> None:
-    """Check detector and experiment files. Mistakes are named with file, line and key."""
+    """Check detector, experiment and scene files. Mistakes are named with file, line and key."""
     wrong = False
     for path in files:
         try:
@@ -136,9 +138,10 @@ def schema(
     ] = None,
 ) -> None:
     """Print a JSON Schema of such a file, for editors."""
-    from uwbbench.schema import detector_schema, experiment_schema
+    from uwbbench.schema import detector_schema, experiment_schema, scene_schema
 
-    made = detector_schema() if file is File.DETECTOR else experiment_schema()
+    makers = {File.DETECTOR: detector_schema, File.EXPERIMENT: experiment_schema, File.SCENE: scene_schema}
+    made = makers[file]()
     if output is None:
         render.print_json(made)
         return

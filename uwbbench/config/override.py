@@ -26,8 +26,8 @@ def with_values(data: Mapping[str, Any], changes: Mapping[str, Any], where: str)
     data : mapping
         Parsed file.
     changes : mapping
-        Value by dotted path. An item of a list is addressed by its number, or by the value of its ``as`` or ``use``
-        key even where that holds dots: ``pipeline.filter.width.params.minimum``.
+        Value by dotted path. An item of a list is addressed by its number, or by the value of its ``as``, ``use`` or
+        ``id`` key, even where that holds dots: ``pipeline.filter.width.params.minimum``.
     where : str
         Who asks, for messages.
 
@@ -68,7 +68,7 @@ def _item(items: list[Any], rest: str, path: str, where: str) -> tuple[int, str]
     for index, item in enumerate(items):
         names[str(index)] = index
         if isinstance(item, dict):
-            names.setdefault(str(item.get("as") or item.get("use")), index)
+            names.setdefault(str(item.get("as") or item.get("use") or item.get("id")), index)
     for name in sorted(names, key=len, reverse=True):
         if rest == name or rest.startswith(f"{name}."):
             return names[name], rest[len(name) + 1 :]

@@ -1,0 +1,1 @@
+"""Simulated captures: a scene, the terms it names, and the engine that adds them up."""

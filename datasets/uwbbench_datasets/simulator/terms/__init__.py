@@ -1,0 +1,1 @@
+"""Terms of simulated scenes, one module a kind."""

@@ -1,0 +1,42 @@
+"""The pose that a robot believes in."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+from pydantic import Field
+
+from uwbbench.api import Capture, Params, Term
+from uwbbench.api.geometry import rotate_z, wrap_angle
+
+
+class OdometryParams(Params):
+    """How far wheels are to be believed."""
+
+    distance_error: float = Field(0.02, ge=0, lt=1, description="Standard deviation of the scale, drawn once a run.")
+    rotation_error: float = Field(0.02, ge=0, lt=1, description="The same for the angle turned.")
+    heading_noise_deg: float = Field(0.5, ge=0, description="Random walk of the heading, after one metre.")
+
+
+class Odometry(Term[OdometryParams]):
+    """Drifting odometry: each step between frames is measured in the robot frame, with errors, and added up.
+
+    A wrong wheel radius stretches all steps of a run, a wrong track width all turns, and slip lets the heading walk
+    with the square root of the distance. Odometry starts at the true pose. The same for all receivers of the robot.
+    """
+
+    shared = True
+
+    def record(self, capture: Capture, rng: np.random.Generator) -> Capture:
+        """Add the drifting pose."""
+        p, track = self.params, capture.trajectory
+        stretch = 1 + p.distance_error * rng.standard_normal()
+        turned = 1 + p.rotation_error * rng.standard_normal()
+        steps = np.diff(track.position_m, axis=0)
+        walk = np.radians(p.heading_noise_deg) * np.sqrt(np.linalg.norm(steps, axis=1))
+        turns = turned * wrap_angle(np.diff(track.yaw_rad)) + walk * rng.standard_normal(len(steps))
+        yaw_rad = track.yaw_rad[:1] + np.concatenate([[0.0], np.cumsum(turns)])[: len(track)]
+        own = stretch * rotate_z(steps, yaw_rad[:-1] - track.yaw_rad[:-1])
+        position_m = track.position_m[:1] + np.concatenate([np.zeros((1, 3)), np.cumsum(own, axis=0)])[: len(track)]
+        return dataclasses.replace(capture, odometry_position_m=position_m, odometry_yaw_rad=yaw_rad)

@@ -1,0 +1,126 @@
+"""Walls: their mirror image of the transmitter, and the many weak echoes of what stands on them."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator
+
+import numpy as np
+from pydantic import Field
+
+from uwbbench.api import ComplexArray, FloatArray, Params, Paths, SceneObject, Term, View
+from uwbbench_datasets.simulator.materials import reflection
+from uwbbench_datasets.simulator.shapes import Face, faces
+from uwbbench_datasets.simulator.terms.echo import face_echo
+
+
+def walls(view: View) -> Iterator[tuple[int, SceneObject]]:
+    """Walls of a scene with their column among the objects."""
+    return ((column, thing) for column, thing in enumerate(view.objects) if thing.shape == "wall")
+
+
+def mirrored(points_m: FloatArray, face: Face) -> FloatArray:
+    """Points (..., 3) on the other side of a face's plane."""
+    return np.asarray(points_m - 2 * ((points_m - face.center_m) @ face.normal)[..., None] * face.normal)
+
+
+class WallParams(Params):
+    """How walls reflect."""
+
+    infinite: bool = Field(False, description="Walls without ends: mirrors that reflect from wherever they are seen.")
+
+
+class WallEcho(Term[WallParams]):
+    """Echoes of walls: the transmitter's mirror image, faded by the Fresnel integral towards the wall's ends.
+
+    An endless wall returns ``G lambda / (4 pi L)`` over the length ``L`` from the image of the transmitter to the
+    receiver, with the reflection coefficient ``G`` of the material or slab at normal incidence, which is how a radar
+    whose antennas stand close together meets its walls.
+    """
+
+    def bound(self, view: View) -> float:
+        """All walls of a frame in phase, each at the most that its distance allows."""
+        found = self._all(view, bound=True)
+        return 0.0 if found is None else float(np.max(np.sum(np.abs(found.amplitude), axis=1)))
+
+    def paths(self, view: View, rng: np.random.Generator) -> Paths | None:  # noqa: ARG002
+        """One path for each side of each wall."""
+        return self._all(view, bound=False)
+
+    def _finite(self, face: Face, view: View, *, bound: bool) -> tuple[FloatArray, FloatArray]:
+        return face_echo(face, view.transmitter_m, view.receiver_m, view.radar.wavelength_m, bound=bound)
+
+    def _mirror(self, face: Face, view: View) -> tuple[FloatArray, FloatArray]:
+        """Point of reflection (frames, 3) and amplitude (frames,) of an endless perfect mirror."""
+        endless = dataclasses.replace(face, width_m=np.inf, height_m=np.inf)
+        point, seen = face_echo(endless, view.transmitter_m, view.receiver_m, view.radar.wavelength_m)
+        length = np.linalg.norm(mirrored(view.transmitter_m, face) - view.receiver_m, axis=1)
+        return point, np.where(seen > 0, view.radar.wavelength_m / (4 * np.pi * np.maximum(length, 1e-9)), 0.0)
+
+    def _all(self, view: View, *, bound: bool) -> Paths | None:
+        points, amplitudes = [], []
+        for column, wall in walls(view):
+            strength = reflection(wall.material, view.radar.center_frequency_hz, wall.thickness_m)
+            for face in faces(wall):
+                seen = self._mirror(face, view) if self.params.infinite else self._finite(face, view, bound=bound)
+                points.append(seen[0])
+                amplitudes.append(strength * seen[1] * view.visibility[:, column])
+        return view.echoes(np.stack(points, axis=1), np.stack(amplitudes, axis=1)) if points else None
+
+
+class ClutterParams(Params):
+    """How rough walls are."""
+
+    per_m2: float = Field(0.5, gt=0, le=1000, description="Mean number of scatterers on a square metre of wall.")
+    rcs_m2: float = Field(0.01, gt=0, description="Mean radar cross section of a scatterer.")
+    depth_m: float = Field(0.1, ge=0, description="Scatterers stand out from the wall by up to this.")
+
+
+class WallClutter(Term[ClutterParams]):
+    """Weak echoes of sockets, frames and shelves: points scattered over the walls, drawn once a run.
+
+    Their number is Poisson's, their cross section exponential (Swerling's first case), their places even; each echo
+    follows the radar equation. They stand still in the world and are the same for all receivers.
+    """
+
+    shared = True
+    _scatterers: list[tuple[int, Face, FloatArray, ComplexArray]]
+
+    def prepare(self, view: View, rng: np.random.Generator) -> View:
+        """Draw the scatterers of both sides of each wall."""
+        p = self.params
+        self._scatterers = []
+        for column, wall in walls(view):
+            for face in faces(wall):
+                count = rng.poisson(p.per_m2 * face.width_m * face.height_m)
+                along, up = rng.uniform(-0.5, 0.5, (2, count, 1))
+                out = rng.uniform(0, p.depth_m, (count, 1))
+                place = face.center_m + along * face.width_m * face.across + out * face.normal
+                place[:, 2:] += up * face.height_m
+                root = np.sqrt(rng.exponential(p.rcs_m2, count)) * np.exp(2j * np.pi * rng.uniform(size=count))
+                self._scatterers.append((column, face, place, root))
+        return view
+
+    def bound(self, view: View) -> float:
+        """All scatterers of a frame in phase."""
+        largest = [np.max(np.sum(np.abs(found.amplitude), axis=1)) for found in self._each(view)]
+        return float(np.sum(largest))
+
+    def paths(self, view: View, rng: np.random.Generator) -> Paths | None:  # noqa: ARG002
+        """One path for each scatterer, from the sides of walls that face the radar."""
+        found = list(self._each(view))
+        if not found:
+            return None
+        names = ("delay_s", "amplitude", "azimuth_rad")
+        return Paths(*(np.concatenate([getattr(one, name) for one in found], axis=1) for name in names))
+
+    def _each(self, view: View) -> Iterator[Paths]:
+        for column, face, place, root in self._scatterers:
+            out = np.linalg.norm(place - view.transmitter_m[:, None], axis=-1)
+            back = np.linalg.norm(place - view.receiver_m[:, None], axis=-1)
+            front = ((view.receiver_m - face.center_m) @ face.normal > 0) & (
+                (view.transmitter_m - face.center_m) @ face.normal > 0
+            )
+            shown = (front * view.visibility[:, column])[:, None]
+            scale = view.radar.wavelength_m / (4 * np.pi) ** 1.5
+            yield view.echoes(place, shown * scale * root / np.maximum(out * back, 1e-6))

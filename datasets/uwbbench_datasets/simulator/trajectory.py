@@ -1,0 +1,198 @@
+"""Ways of the robot: what a scene may say about them, and the pose at each frame."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from uwbbench.api import CaptureError, FloatArray, Params, Trajectory
+
+Point = Annotated[list[float], Field(min_length=2, max_length=3)]
+"""x and y, or x, y and z, in metres."""
+_LONGEST = 2_000_000
+"""Frames of one run: far more is a slip in a unit."""
+
+
+def in_space(point: list[float]) -> FloatArray:
+    """Point (3,) from two or three coordinates."""
+    return np.asarray([*point, 0.0][:3], float)
+
+
+class Static(Params):
+    """The robot stands still."""
+
+    kind: Literal["static"]
+    position_m: Point = Field(default=[0.0, 0.0])
+    yaw_deg: float = 0.0
+    duration_s: float = Field(gt=0)
+
+    def sampled(self, rate_hz: float) -> Trajectory:
+        """Pose at each frame."""
+        times = _times(self.duration_s, rate_hz)
+        return _poses(times, np.tile(in_space(self.position_m), (len(times), 1)), np.radians(self.yaw_deg))
+
+
+class Straight(Params):
+    """From one point straight to another at constant speed."""
+
+    kind: Literal["straight"]
+    start_m: Point
+    end_m: Point
+    speed_m_s: float = Field(0.3, gt=0)
+    yaw_deg: float | None = Field(None, description="Heading; along the way if left out.")
+
+    def sampled(self, rate_hz: float) -> Trajectory:
+        """Pose at each frame."""
+        return _along([self.start_m, self.end_m], self.speed_m_s, self.yaw_deg, rate_hz)
+
+
+class Waypoints(Params):
+    """Straight legs between points at constant speed; the robot turns in an instant at each."""
+
+    kind: Literal["waypoints"]
+    points_m: list[Point] = Field(min_length=2)
+    speed_m_s: float = Field(0.3, gt=0)
+    yaw_deg: float | None = Field(None, description="Heading; along each leg if left out.")
+
+    def sampled(self, rate_hz: float) -> Trajectory:
+        """Pose at each frame."""
+        return _along(self.points_m, self.speed_m_s, self.yaw_deg, rate_hz)
+
+
+class Arc(Params):
+    """Along a circle at constant speed, heading along it."""
+
+    kind: Literal["arc"]
+    center_m: Point
+    radius_m: float = Field(gt=0)
+    start_deg: float = Field(0.0, description="Where on the circle the robot starts, from +x.")
+    sweep_deg: float = Field(360.0, description="How far it goes; negative is clockwise.")
+    speed_m_s: float = Field(0.3, gt=0)
+
+    @model_validator(mode="after")
+    def _moves(self) -> Arc:
+        if self.sweep_deg == 0:
+            raise ValueError("sweep_deg must not be 0; a robot that stands still is kind: static")
+        return self
+
+    def sampled(self, rate_hz: float) -> Trajectory:
+        """Pose at each frame."""
+        sweep = np.radians(self.sweep_deg)
+        times = _times(abs(sweep) * self.radius_m / self.speed_m_s, rate_hz)
+        angle = np.radians(self.start_deg) + np.sign(sweep) * times * self.speed_m_s / self.radius_m
+        ahead = np.stack([np.cos(angle), np.sin(angle), np.zeros_like(angle)], axis=1)
+        return _poses(times, in_space(self.center_m) + self.radius_m * ahead, angle + np.sign(sweep) * np.pi / 2)
+
+
+class StopAndGo(Params):
+    """Straight ahead in equal steps, with a halt after each."""
+
+    kind: Literal["stop_and_go"]
+    start_m: Point
+    end_m: Point
+    step_m: float = Field(gt=0)
+    halt_s: float = Field(gt=0)
+    speed_m_s: float = Field(0.3, gt=0)
+    yaw_deg: float | None = Field(None, description="Heading; along the way if left out.")
+
+    def sampled(self, rate_hz: float) -> Trajectory:
+        """Pose at each frame."""
+        start, end = in_space(self.start_m), in_space(self.end_m)
+        length = float(np.linalg.norm(end - start))
+        stops = int(np.ceil(length / self.step_m - 1e-9))
+        if stops * (self.halt_s + self.step_m / self.speed_m_s) * rate_hz > _LONGEST:
+            raise CaptureError(f"a trajectory of {stops} steps has more than {_LONGEST} frames")
+        reached = np.minimum(np.arange(1, stops + 1) * self.step_m, length)
+        arrivals = reached / self.speed_m_s + np.arange(stops) * self.halt_s
+        knots_s = np.concatenate([[0.0], np.stack([arrivals, arrivals + self.halt_s], axis=1).ravel()])
+        times = _times(knots_s[-1], rate_hz)
+        gone = np.interp(times, knots_s, np.concatenate([[0.0], np.repeat(reached, 2)]))
+        ahead = (end - start) / length if length else np.array([1.0, 0.0, 0.0])
+        yaw = np.arctan2(ahead[1], ahead[0]) if self.yaw_deg is None else np.radians(self.yaw_deg)
+        return _poses(times, start + gone[:, None] * ahead, float(yaw))
+
+
+class FromFile(Params):
+    """Poses from a CSV file beside the scene, between which the frames are interpolated.
+
+    Columns ``timestamp_s``, ``x_m``, ``y_m``, ``yaw_rad`` and, if the height changes, ``z_m``.
+    """
+
+    kind: Literal["file"]
+    file: str = Field(description="Path from the scene's folder, which it must not leave.")
+
+    def sampled(self, rate_hz: float, folder: Path) -> Trajectory:
+        """Pose at each frame."""
+        path = folder / self.file
+        if not path.resolve().is_relative_to(folder.resolve()):
+            raise CaptureError(f"trajectory file '{self.file}' must lie in the scene's folder")
+        table = _read_poses(path)
+        times = table["timestamp_s"][0] + _times(float(np.ptp(table["timestamp_s"])), rate_hz)
+        columns = [np.interp(times, table["timestamp_s"], table[name]) for name in ("x_m", "y_m", "z_m")]
+        yaw = np.interp(times, table["timestamp_s"], np.unwrap(table["yaw_rad"]))
+        return _poses(times, np.stack(columns, axis=1), yaw)
+
+
+TrajectoryModel = Annotated[Static | Straight | Waypoints | Arc | StopAndGo | FromFile, Field(discriminator="kind")]
+
+
+def sampled(model: TrajectoryModel, rate_hz: float, folder: Path) -> Trajectory:
+    """Pose at each frame of a run.
+
+    Raises
+    ------
+    CaptureError
+        If a trajectory file cannot be used, or the run is absurdly long.
+    """
+    return model.sampled(rate_hz, folder) if isinstance(model, FromFile) else model.sampled(rate_hz)
+
+
+def _times(duration_s: float, rate_hz: float) -> FloatArray:
+    """Frame times from 0 to the duration; one frame at least."""
+    if duration_s * rate_hz > _LONGEST:
+        raise CaptureError(f"a trajectory of {duration_s:g} s has more than {_LONGEST} frames at {rate_hz:g} Hz")
+    return np.arange(int(duration_s * rate_hz * (1 + 1e-12)) + 1) / rate_hz
+
+
+def _poses(times: FloatArray, position_m: FloatArray, yaw_rad: FloatArray | float) -> Trajectory:
+    return Trajectory(times, position_m, np.broadcast_to(np.asarray(yaw_rad, float), times.shape).copy())
+
+
+def _along(points: list[Point], speed_m_s: float, yaw_deg: float | None, rate_hz: float) -> Trajectory:
+    knots = np.stack([in_space(point) for point in points])
+    legs = np.diff(knots, axis=0)
+    reached = np.concatenate([[0.0], np.cumsum(np.linalg.norm(legs, axis=1))])
+    times = _times(reached[-1] / speed_m_s, rate_hz)
+    gone = np.minimum(times * speed_m_s, reached[-1])
+    position = np.stack([np.interp(gone, reached, knots[:, axis]) for axis in range(3)], axis=1)
+    if yaw_deg is not None:
+        return _poses(times, position, np.radians(yaw_deg))
+    leg = np.clip(np.searchsorted(reached, gone, side="right") - 1, 0, len(legs) - 1)
+    return _poses(times, position, np.arctan2(legs[:, 1], legs[:, 0])[leg])
+
+
+def _read_poses(path: Path) -> dict[str, FloatArray]:
+    try:
+        with path.open(newline="", encoding="utf-8") as stream:
+            rows = list(csv.DictReader(stream))
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise CaptureError(f"{path}: cannot be read: {error}") from error
+    if len(rows) < 2:
+        raise CaptureError(f"{path}: needs a header and at least two poses")
+    table = {"z_m": np.zeros(len(rows))}
+    for name in ("timestamp_s", "x_m", "y_m", "yaw_rad", *(("z_m",) if "z_m" in rows[0] else ())):
+        if name not in rows[0]:
+            raise CaptureError(f"{path}: has no column '{name}'")
+        try:
+            table[name] = np.array([float(row[name]) for row in rows])
+        except (TypeError, ValueError) as error:
+            raise CaptureError(f"{path}: column '{name}': {error}") from error
+        if not np.all(np.isfinite(table[name])):
+            raise CaptureError(f"{path}: column '{name}' holds a value that is not finite")
+    if not np.all(np.diff(table["timestamp_s"]) > 0):
+        raise CaptureError(f"{path}: column 'timestamp_s' must increase")
+    return table

@@ -1,0 +1,138 @@
+"""Scene files: variants, names, and what is wrong with a wrong one."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from uwbbench.api import CaptureError, ConfigError, PluginError
+from uwbbench.config.locate import shipped
+from uwbbench.registry import load
+from uwbbench_datasets.simulator.dataset import Simulated, SimulatedParams
+from uwbbench_datasets.simulator.scene import read_scenes
+
+SCENE = """\
+schema: 1
+trajectory: {kind: straight, start_m: [0, 0], end_m: [0.2, 0], speed_m_s: 0.3}
+objects:
+  - {id: plate, shape: plate, center_m: [2.0, 0.1], width_m: 0.25, height_m: 0.28}
+terms:
+  - {use: direct}
+  - {use: noise}
+"""
+
+
+@pytest.fixture
+def write(tmp_path: Path):
+    def made(text: str = SCENE, extra: str = "", name: str = "room.yaml") -> Path:
+        path = tmp_path / name
+        path.write_text(text + extra)
+        return path
+
+    return made
+
+
+def test_every_combination_of_what_varies_is_a_variant_with_a_readable_name(write) -> None:
+    path = write(extra="vary:\n  radar.channel: [5, 9]\n  objects.plate.material: [metal, concrete]\n")
+    scenes = read_scenes(path)
+    assert [scene.name for scene in scenes] == [
+        "room/channel-5_material-metal",
+        "room/channel-5_material-concrete",
+        "room/channel-9_material-metal",
+        "room/channel-9_material-concrete",
+    ]
+    assert [scene.model.objects[0].material for scene in scenes] == ["metal", "concrete"] * 2
+    assert [scene.radar("front").channel for scene in scenes] == [5, 5, 9, 9]
+
+
+def test_setting_what_varies_fixes_it(write) -> None:
+    path = write(extra="vary: {radar.channel: [5, 9]}\n")
+    (scene,) = read_scenes(path, {"radar.channel": 5})
+    assert (scene.name, scene.model.radar.channel) == ("room", 5)
+
+
+def test_paths_that_end_alike_keep_more_of_their_names(write) -> None:
+    second = SCENE.replace("terms:", "  - {id: wall, shape: wall, center_m: [4, 0], width_m: 5}\nterms:")
+    path = write(second, "vary:\n  objects.plate.material: [metal]\n  objects.wall.material: [concrete]\n")
+    assert read_scenes(path)[0].name == "room/plate.material-metal_wall.material-concrete"
+
+
+def test_terms_and_objects_are_addressed_by_name(write) -> None:
+    changes = {"terms.noise.params.snr_db": 30.0, "objects.plate.width_m": 0.5}
+    (scene,) = read_scenes(write(), changes)
+    assert scene.terms[1][2].snr_db == 30.0  # type: ignore[attr-defined]
+    assert scene.model.objects[0].width_m == 0.5
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("noise}", "noize}", r"room.yaml:7: terms\[1\].use: no term named 'noize' is installed. Did you mean 'noise'"),
+        ("{use: noise}", "{use: noise, params: {snr: 3}}", r"unknown key 'snr'. Did you mean 'snr_db'"),
+        ("{use: noise}", "{use: direct}", "term 'direct' appears twice; name one of them with 'as'"),
+        ("kind: straight", "kind: strait", "trajectory"),
+        ("shape: plate", "shape: box", "a box needs depth_m"),
+        ("width_m: 0.25", "radius_m: 0.25", "a plate has no radius_m"),
+        ("schema: 1", "schema: 2", "schema"),
+        ("schema: 1", "schema: 1\nradar: {chanel: 5}", "unknown key 'chanel'. Did you mean 'channel'"),
+        ("schema: 1", "schema: 1\nradar: {crest_tap: 60}", "crest_tap must lie behind the noise_taps"),
+        ("schema: 1", "schema: 1\nreceivers: {front: {tx_position_m: [0, 0]}}", "a direct path needs a distance"),
+        ("schema: 1", "schema: 1\nfidelity: {force: [walls]}", "names 'walls', which is no term of the scene"),
+        ("schema: 1", "schema: 1\nvary: {radar.channel: [5, 7]}", "channel"),
+        ("schema: 1", "schema: 1\nvary: {objects.door.material: [metal]}", "no item 'door.material'"),
+    ],
+)
+def test_a_wrong_scene_is_told_where_and_why(write, old, new, message) -> None:
+    with pytest.raises((ConfigError, PluginError), match=message):
+        read_scenes(write(SCENE.replace(old, new)))
+
+
+def test_a_term_may_be_used_twice_under_two_names(write) -> None:
+    text = SCENE.replace("{use: noise}", "{use: noise}\n  - {use: noise, as: hiss, params: {snr_db: 20}}")
+    (scene,) = read_scenes(write(text))
+    assert [use.name for use, _, _ in scene.terms] == ["direct", "noise", "hiss"]
+
+
+@pytest.mark.parametrize("name", sorted(shipped("scenes")))
+def test_shipped_scenes_can_be_read(name: str) -> None:
+    scenes = read_scenes(shipped("scenes")[name])
+    assert len({scene.name for scene in scenes}) == len(scenes)
+
+
+def dataset(folder: Path, **params: object) -> Simulated:
+    return Simulated(SimulatedParams.model_validate(params), [folder])
+
+
+def test_the_dataset_names_scene_variant_run_and_receiver(write, tmp_path: Path) -> None:
+    write(extra="runs: 2\nvary: {radar.channel: [5, 9]}\n")
+    assert dataset(tmp_path, scenes=["room.yaml"]).names() == [
+        "room/channel-5/1",
+        "room/channel-5/2",
+        "room/channel-9/1",
+        "room/channel-9/2",
+    ]
+    assert dataset(tmp_path, scenes=["room.yaml"], runs=1, set={"radar.channel": 9}).names() == ["room/1"]
+    two = {"receivers": {"front": {}, "side": {"mount_yaw_deg": 90, "mount_position_m": [0, 0.1]}}}
+    names = dataset(tmp_path, scenes=["room.yaml"], runs=1, set={"radar.channel": 9, **two}).names()
+    assert names == ["room/1/front", "room/1/side"]
+
+
+def test_the_dataset_opens_what_it_names(write, tmp_path: Path) -> None:
+    write(extra="runs: 2\n")
+    made = dataset(tmp_path, scenes=["room.yaml"])
+    first, second = (made.open(name) for name in made.names())
+    assert (first.name, first.source) == ("room/1", "simulated")
+    assert not np.array_equal(first.preamble, second.preamble)
+    with pytest.raises(CaptureError, match=r"no simulated capture 'room/3'\. Did you mean"):
+        made.open("room/3")
+
+
+def test_two_scenes_of_one_name_are_refused(write, tmp_path: Path) -> None:
+    write()
+    write(extra="name: room\n", name="other.yaml")
+    with pytest.raises(ConfigError, match="two scenes are named 'room'"):
+        dataset(tmp_path, scenes=["room.yaml", "other.yaml"]).names()
+
+
+def test_the_dataset_is_registered() -> None:
+    assert load("datasets", "simulated") is Simulated

@@ -1,0 +1,254 @@
+"""One part of a simulated scene: what a term declares, what it sees, and what it adds.
+
+A simulated frame is a sum of pulses, one for each path from the transmitter to a receiver, that a receiver then
+distorts. Everything in it comes from terms; a scene names those it wants, and what is not named costs nothing.
+
+Delays count from the crest of the direct path. Amplitudes are field strengths in units where a free-space path of
+length ``d`` between isotropic antennas has ``wavelength / (4 pi d)``.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, ClassVar, Generic, Literal, Protocol
+
+import numpy as np
+
+from uwbbench.api.arrays import ComplexArray, FloatArray
+from uwbbench.api.capture import Capture
+from uwbbench.api.geometry import SPEED_OF_LIGHT_M_S, rotate_z
+from uwbbench.api.radar import Radar
+from uwbbench.api.stage import Fidelity, P, Params, params_type_of
+from uwbbench.api.truth import Obstacle
+
+Shape = Literal["plate", "box", "rod", "wall", "person", "point"]
+"""Plates and walls are flat, boxes have four faces, rods and persons are upright cylinders."""
+
+
+class Pulse(Protocol):
+    """Shape of one echo on the taps: real, with unit height at time zero."""
+
+    @property
+    def support_s(self) -> float:
+        """Time on either side of the crest beyond which the pulse is nothing."""
+
+    def __call__(self, time_s: FloatArray, /) -> FloatArray:
+        """Height at the given times."""
+
+
+@dataclass(frozen=True)
+class SceneObject:
+    """One object of a scene, as terms see it.
+
+    Attributes
+    ----------
+    obstacle : Obstacle
+        Name, material and outline, as in the ground truth.
+    shape : str
+        ``plate``, ``box``, ``rod``, ``wall``, ``person`` or ``point``.
+    center_m : (3,) array
+        Centre of the body in the world.
+    yaw_rad : float
+        Heading of its front: the outward normal of a plate's or wall's front face.
+    width_m, depth_m, height_m : float
+        Full sizes across the normal, along it, and upwards; a cylinder's diameter is width and depth.
+    thickness_m : float or None
+        Wall thickness for the reflection of a slab; None for a body that waves do not come out of again.
+    """
+
+    obstacle: Obstacle
+    shape: Shape
+    center_m: FloatArray
+    yaw_rad: float
+    width_m: float
+    depth_m: float
+    height_m: float
+    thickness_m: float | None = None
+
+    @property
+    def name(self) -> str:
+        """Identifier inside the scene."""
+        return self.obstacle.name
+
+    @property
+    def material(self) -> str:
+        """Name of the material."""
+        return self.obstacle.material
+
+    @property
+    def structure(self) -> bool:
+        """Whether it is a wall or the like, which no detector is asked to find."""
+        return self.obstacle.structure
+
+
+@dataclass(frozen=True)
+class Paths:
+    """Ways over which the signal reaches the receiver.
+
+    Attributes
+    ----------
+    delay_s : (frames or 1, paths) array
+        Delay after the direct path's crest.
+    amplitude : (frames or 1, paths) complex array
+        Strength with the carrier's phase, antenna gains included.
+    azimuth_rad : (frames or 1, paths) array
+        Direction of arrival from boresight, positive to the left; sets the phase between the two antennas.
+    """
+
+    delay_s: FloatArray
+    amplitude: ComplexArray
+    azimuth_rad: FloatArray
+
+
+@dataclass(frozen=True)
+class Responses:
+    """Channel impulse responses of a block of frames, each (frames, taps) complex128.
+
+    Attributes
+    ----------
+    preamble : array
+    sts1, sts2 : array or None
+        The responses of the two antennas; both or neither.
+    """
+
+    preamble: ComplexArray
+    sts1: ComplexArray | None = None
+    sts2: ComplexArray | None = None
+
+    def map(self, function: Callable[[ComplexArray], ComplexArray]) -> Responses:
+        """The same function of each response that is there."""
+        return Responses(*(None if one is None else function(one) for one in (self.preamble, self.sts1, self.sts2)))  # type: ignore[arg-type]  # the preamble is always there
+
+
+@dataclass(frozen=True)
+class View:
+    """One receiver in its scene, over all frames or a block of them. Arrays are shared, never changed in place.
+
+    Attributes
+    ----------
+    radar : Radar
+    first : int
+        Index of the first frame.
+    timestamp_s : (frames,) array
+    receiver_m, transmitter_m : (frames, 3) array
+        Positions in the world.
+    boresight_rad : (frames,) array
+        Heading of the receiver in the world.
+    objects : tuple of SceneObject
+    visibility : (frames, objects) array
+        Amplitude that passes from the radar to an object and back: 1 in free sight, 0 behind something opaque.
+    crest_tap : (frames,) array
+        Fractional tap of the direct path's crest.
+    direct_amplitude : float
+        Amplitude of the direct path's crest; free space, unless a term attenuates it.
+    receive_gain : callable
+        Amplitude gain of the receiving antenna, for echoes, at azimuths of any shape.
+    array_phase : callable
+        Phase in radians of the second antenna over the first, at azimuths of any shape.
+    pulse : Pulse
+    """
+
+    radar: Radar
+    first: int
+    timestamp_s: FloatArray
+    receiver_m: FloatArray
+    transmitter_m: FloatArray
+    boresight_rad: FloatArray
+    objects: tuple[SceneObject, ...]
+    visibility: FloatArray
+    crest_tap: FloatArray
+    direct_amplitude: float
+    receive_gain: Callable[[FloatArray], FloatArray]
+    array_phase: Callable[[FloatArray], FloatArray]
+    pulse: Pulse
+
+    def __len__(self) -> int:
+        return len(self.timestamp_s)
+
+    def replace(self, **parts: Any) -> View:
+        """View with some parts replaced."""
+        return dataclasses.replace(self, **parts)
+
+    def part(self, start: int, stop: int) -> View:
+        """Frames ``start`` to ``stop`` of this view."""
+        names = ("timestamp_s", "receiver_m", "transmitter_m", "boresight_rad", "visibility", "crest_tap")
+        return self.replace(first=self.first + start, **{name: getattr(self, name)[start:stop] for name in names})
+
+    def azimuth_rad(self, points_m: FloatArray) -> FloatArray:
+        """Azimuth (frames, n) from boresight of world points (frames or 1, n, 3)."""
+        local = rotate_z(points_m - self.receiver_m[:, None], -self.boresight_rad[:, None])
+        return np.arctan2(local[..., 1], local[..., 0])
+
+    def delay_s(self, points_m: FloatArray) -> FloatArray:
+        """Delay (frames, n) after the direct path of an echo from world points (frames or 1, n, 3)."""
+        out = np.linalg.norm(points_m - self.transmitter_m[:, None], axis=-1)
+        back = np.linalg.norm(points_m - self.receiver_m[:, None], axis=-1)
+        return np.asarray((out + back - self.radar.baseline_length_m) / SPEED_OF_LIGHT_M_S)
+
+    def echoes(self, points_m: FloatArray, amplitude: FloatArray | ComplexArray) -> Paths:
+        """Paths by way of world points (frames or 1, n, 3), with the receiving antenna's gain and the carrier's phase.
+
+        ``amplitude`` (frames or 1, n) is what an isotropic antenna would receive.
+        """
+        delay_s, azimuth_rad = self.delay_s(points_m), self.azimuth_rad(points_m)
+        carrier = np.exp(-2j * np.pi * self.radar.center_frequency_hz * delay_s)
+        return Paths(delay_s, amplitude * self.receive_gain(azimuth_rad) * carrier, azimuth_rad)
+
+
+class Term(Generic[P]):
+    """One part of a simulated scene: override the hooks it needs.
+
+    Each hook runs through the terms in the order of the scene's list; of each term, one instance serves one receiver
+    in one run. ``rng`` is the term's own random stream, so that terms added, dropped or moved never change what
+    another one draws. The streams of ``paths`` and ``apply`` start anew at each block of frames, whose boundaries
+    are fixed; what lasts longer than a frame is drawn in ``prepare``. ``paths`` and ``apply`` may run in several
+    threads and must not change the instance.
+
+    Class attributes
+    ----------------
+    shared : bool
+        True where the draws belong to the robot and are the same for all of its receivers.
+    fidelity : str
+        Where the model comes from, as of a stage.
+    """
+
+    shared: ClassVar[bool] = False
+    fidelity: ClassVar[Fidelity] = "baseline"
+
+    def __init__(self, params: P) -> None:
+        self.params: P = params
+
+    @classmethod
+    def params_type(cls) -> type[Params]:
+        """Pydantic model of the parameters."""
+        return params_type_of(cls, Term)
+
+    def prepare(self, view: View, rng: np.random.Generator) -> View:  # noqa: ARG002
+        """Start a run, given all of its frames: draw what lasts, and change gains, visibility or sampling."""
+        return view
+
+    def bound(self, view: View) -> float | None:  # noqa: ARG002
+        """Upper bound of the amplitude that the paths add to any tap of any frame, before any is synthesised.
+
+        ``fidelity: auto`` leaves the term out where this stays far enough below the noise. None, the default, means
+        that the term cannot be left out.
+        """
+        return None
+
+    def noise_rms(self, view: View) -> float:  # noqa: ARG002
+        """Root mean square of the complex noise that this term adds to each tap of the preamble."""
+        return 0.0
+
+    def paths(self, view: View, rng: np.random.Generator) -> Paths | None:  # noqa: ARG002
+        """Paths that this term adds to a block of frames."""
+        return None
+
+    def apply(self, responses: Responses, view: View, rng: np.random.Generator) -> Responses:  # noqa: ARG002
+        """Change a block's responses: what a receiver does to the sum of all paths."""
+        return responses
+
+    def record(self, capture: Capture, rng: np.random.Generator) -> Capture:  # noqa: ARG002
+        """Change the finished recording as a whole: what it reports, its odometry, which frames arrive and when."""
+        return capture
