@@ -321,6 +321,28 @@ def test_candidates_are_the_same_whether_asked_for_before_or_after():
     assert_same(pipeline.run(capture).candidates, pipeline.run(capture, candidates=True).candidates)
 
 
+@pytest.mark.parametrize("steps", [CHAIN, (*CHAIN[:2], ("late", "{frames: 3}"), *CHAIN[2:])])
+def test_the_audit_names_the_filter_that_dropped_each_candidate(steps):
+    found = detector(*steps).run(capture_of(invalid=[2]), candidates=True)
+    candidates, labels = found.candidates, list(found.chain)
+    amplitude, by = candidates["amplitude"], candidates["rejected_by"]
+    np.testing.assert_array_equal(by == labels.index("at_least-1"), amplitude < 0.5)
+    np.testing.assert_array_equal(
+        by == labels.index(f"at_least-{len(steps) - 1}"), (amplitude >= 0.5) & (amplitude < 1)
+    )
+    np.testing.assert_array_equal(np.isnan(by), candidates["retained"] == 1)
+
+
+def test_signals_are_the_blocks_that_the_first_detecting_stage_is_handed(approach):
+    blocks = list(load_detector("background-mean").signals(approach))
+    assert sum(len(block.frames) for block in blocks) == len(approach)
+    assert all(block.profile is not None and block.noise_rms is not None for block in blocks)
+    assert not any(len(block.detections) for block in blocks)
+    raw, cleaned = approach.frames(200, 201).amplitude[0], blocks[0].frames.amplitude[200]
+    assert abs(np.argmax(raw) - 7) <= 1  # the direct path
+    assert np.argmax(cleaned) > 12  # the plate
+
+
 def test_the_audit_changes_no_result():
     pipeline, capture = detector(*CHAIN, "late"), capture_of()
     assert_same(pipeline.run(capture), pipeline.run(capture, candidates=True))

@@ -6,7 +6,7 @@ import contextlib
 import hashlib
 import json
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -68,15 +68,7 @@ class Stream:
 
     def flush(self) -> Detections:
         """Detections that were still held back; ends the stream."""
-        out = []
-        for index, opened in enumerate(self._stages):
-            tail = opened.stage.flush()
-            if tail is not None:
-                tail = _without_rows_of_invalid(tail)
-                if opened.label in self.chain:
-                    self.chain[opened.label] += len(tail.detections)
-                out.append(self._emit(self._through(tail, index + 1)))
-        return Detections.join(out).annotated(notes=self.notes)
+        return Detections.join([self._emit(tail) for tail in self._tails()]).annotated(notes=self.notes)
 
     @property
     def ports(self) -> frozenset[str]:
@@ -95,8 +87,21 @@ class Stream:
 
     @property
     def rejected(self) -> Detections:
-        """Detections that filters dropped, kept only in an audit."""
+        """Detections that filters dropped, kept only in an audit.
+
+        ``rejected_by`` is the place of the filter in ``chain``.
+        """
         return Detections.join(self._rejected)
+
+    def _tails(self) -> Iterator[Block]:
+        """What stages still hold back, each taken through the stages behind it."""
+        for index, opened in enumerate(self._stages):
+            tail = opened.stage.flush()
+            if tail is not None:
+                tail = _without_rows_of_invalid(tail)
+                if opened.label in self.chain:
+                    self.chain[opened.label] += len(tail.detections)
+                yield self._through(tail, index + 1)
 
     def _emit(self, block: Block) -> Detections:
         return block.detections.annotated(processed=block.frames.index[block.frames.valid], notes=self.notes)
@@ -107,7 +112,9 @@ class Stream:
             stage = opened.stage
             if self._audit and isinstance(stage, Filter):
                 keep = stage.keep(block)
-                rejected.append(block.replace(detections=block.detections.take(~keep)))
+                dropped = block.detections.take(~keep)
+                place = np.full(len(dropped), self._place(opened.label))
+                rejected.append(block.replace(detections=dropped.with_columns(rejected_by=place)))
                 block = block.replace(detections=block.detections.take(keep))
             else:
                 if stage.rowwise:
@@ -120,6 +127,10 @@ class Stream:
                 self.chain[opened.label] = self.chain.get(opened.label, 0) + len(block.detections)
         self._rejected += [part.detections for part in rejected]
         return block
+
+    def _place(self, label: str) -> int:
+        """Place of a step in the chain, where it stands from its first block on."""
+        return list(self.chain).index(label) if label in self.chain else len(self.chain)
 
 
 class Pipeline:
@@ -250,6 +261,25 @@ class Pipeline:
             return found.annotated(candidates=_candidates(found, stream.rejected), **facts)
         return found.annotated(candidates=lambda: self._audited(capture), **facts)
 
+    def signals(self, capture: Capture) -> Iterator[Block]:
+        """Blocks as the first stage that makes detections finds them: what it searches, for people to look at.
+
+        Parameters
+        ----------
+        capture : Capture
+
+        Yields
+        ------
+        Block
+            Frames without clutter, ``first_path``, ``noise_rms`` and ``profile``, as far as the detector makes them.
+        """
+        opened = self.open(capture)._stages
+        first = next(place for place, step in enumerate(opened) if "detections" in step.stage.produces)
+        stream = Stream(opened[:first], [])
+        for frames in capture.blocks(BATCH_FRAMES):
+            yield stream._through(Block(_without_invalid(frames)), 0)
+        yield from stream._tails()
+
     def _audited(self, capture: Capture) -> Detections:
         candidates = self.run(capture, candidates=True).candidates
         return Detections.empty() if candidates is None else candidates
@@ -277,8 +307,8 @@ def _makers_of(port: str) -> list[str]:
 
 
 def _candidates(found: Detections, rejected: Detections) -> Detections:
-    """Peaks before the filters, with ``retained`` 1 for those that passed them all."""
-    kept = found.with_columns(retained=np.ones(len(found)))
+    """Peaks before the filters, with ``retained`` 1 for those that passed them all, else ``rejected_by``."""
+    kept = found.with_columns(retained=np.ones(len(found)), rejected_by=np.full(len(found), np.nan))
     dropped = rejected.with_columns(retained=np.zeros(len(rejected)))
     return Detections.join([kept, dropped])
 
