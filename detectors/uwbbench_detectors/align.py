@@ -92,7 +92,9 @@ class Align(Stage[AlignParams]):
         leading = self.radar.noise_taps
         noise = rms(frames.amplitude[:, :leading]) if leading else rayleigh_rms(frames.amplitude)
         height = np.abs(crest)
-        clear = frames.valid & (height > 0) & (height >= 10 ** (self.params.minimum_snr_db / 20) * noise)
+        # The reciprocal of a denormal number overflows.
+        divides = height >= np.finfo(float).tiny
+        clear = frames.valid & divides & (height >= 10 ** (self.params.minimum_snr_db / 20) * noise)
         if not clear[frames.valid].all():
             self.note(
                 "align: frames whose direct path stands less than "

@@ -147,8 +147,9 @@ class ExponentialClutter(ClutterRemoval[ExponentialClutterParams]):
 
     ``y_k = x_k - b_{k-1}``, ``b_k = b_{k-1} + (1 - memory) (x_k - b_{k-1})``, starting from the first frame, which
     comes out as zero. The background is that of the frame before, so that an echo keeps its full height. An obstacle
-    that stands still fades with a time constant of ``1 / (1 - memory)`` frames. Frames whose phase is random must be
-    aligned first.
+    that stands still fades with a time constant of ``1 / (1 - memory)`` frames. What is left within the rounding error
+    of the average becomes zero, such as the crest of aligned frames, which is 1 in all of them. Frames whose phase is
+    random must be aligned first.
 
     With ``adaptive`` a tap is updated, background and deviation alike, only where it lies within ``gate_sigmas``
     deviations of the background. During the first ``1 / (1 - spread_memory)`` frames every tap is updated and the
@@ -176,7 +177,7 @@ class ExponentialClutter(ClutterRemoval[ExponentialClutterParams]):
                 step = np.where(self._learns(residue), step, 0)
             background = background + step
         self._background = background
-        return cleaned
+        return without_rounding(cleaned, samples, math.ceil(4 / gain))
 
     def _learns(self, residue: ComplexArray) -> BoolArray:
         """Mark the taps that may enter the background, and update their variance."""

@@ -101,6 +101,14 @@ def test_featureless_frames_stay_finite(samples, make_radar, make_block, make_st
     assert np.isfinite(aligned).all()
 
 
+@pytest.mark.parametrize("scale", [5e-324, 1e-310])
+def test_frames_too_small_to_divide_by_are_refused(scale, make_radar, make_block, make_stage, make_echoes, run_stage):
+    stage = make_stage("align")
+    aligned = run_stage(stage, make_radar(), make_block(make_echoes(4) * scale)).frames.preamble
+    assert not aligned.any()
+    assert len(stage.notes) == 1
+
+
 def test_radars_counting_from_transmission_pass_unchanged_with_a_note(
     make_radar, make_block, make_stage, make_echoes, run_stage
 ):

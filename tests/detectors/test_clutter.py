@@ -122,6 +122,15 @@ def test_exponential_equals_scipys_recursive_filter(memory, make_radar, make_blo
     np.testing.assert_allclose(cleaned.frames.preamble[1:], samples[1:] - background[:-1], atol=1e-13)
 
 
+def test_exponential_leaves_no_rounding_errors_of_a_tap_that_stays(make_radar, make_block, make_stage, run_stage):
+    rng = np.random.default_rng(4)
+    samples = rng.normal(size=(200, 6)) + 1j * rng.normal(size=(200, 6))
+    samples[:, 3] = 1 + rng.integers(-1, 2, 200) * np.finfo(float).eps
+    cleaned = run_stage(make_stage("clutter.exponential"), make_radar(taps=6), make_block(samples)).frames.preamble
+    assert not cleaned[:, 3].any()
+    assert np.delete(cleaned, 3, axis=1)[1:].all()
+
+
 def _arrival(rng):
     """Fixed clutter and noise; from frame 100 on an echo stands at tap 30."""
     samples = 1 + 0.01 * (rng.normal(size=(400, 50)) + 1j * rng.normal(size=(400, 50)))
