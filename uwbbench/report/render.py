@@ -6,28 +6,18 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from uwbbench.report.report import STANDARD, Report
+from uwbbench.report.limits_sheets import limits_sheets
+from uwbbench.report.paper_sheets import paper_sheets
+from uwbbench.report.report import Report
 from uwbbench.report.sheet import Sheet, escaped, interval, number, shown
+from uwbbench.report.wording import TABLES, TITLES, scale
 from uwbbench.stats import MINIMUM_GROUPS
 from uwbbench.store.folder import RunFolder
-
-_TITLES = {
-    "precision": "precision",
-    "recall": "recall",
-    "f1": "F1",
-    "mae": "MAE",
-    "matched_mae": "MAE of matches",
-    "p90": "P90",
-    "p95": "P95",
-    "sd": "SD",
-    "false_alarms_per_minute": "false alarms",
-}
-_TABLES = {"filtering": "after filtering (range)", "mapping": "after mapping (position)"}
 
 
 def sheets(report: Report) -> list[Sheet]:
     """All tables of a report: leaderboards, the paper's tables, times, and what did not work."""
-    found = [*_leaderboards(report), *_paper_tables(report)]
+    found = [*_leaderboards(report), *paper_sheets(report), *limits_sheets(report.limits)]
     if not report.latency.empty:
         found.append(_latency(report))
     if report.failures:
@@ -69,13 +59,6 @@ def _line(text: str) -> str:
     return " ".join(text.split())
 
 
-def _scale(unit: str) -> tuple[str, int, float]:
-    """How a metric's unit is shown: its name, digits, and the factor to it."""
-    if unit == "m":
-        return " (cm)", 1, 100.0
-    return (f" ({unit})", 2, 1.0) if unit else ("", 3, 1.0)
-
-
 def _leaderboards(report: Report) -> Iterator[Sheet]:
     """One sheet for each dataset, source, scoring and table."""
     units = {name: metric.unit for name, metric in report.metrics.items()} | {"matched_mae": "m"}
@@ -87,18 +70,16 @@ def _leaderboards(report: Report) -> Iterator[Sheet]:
         open_world = any(not about["exhaustive"] for about, _ in members)
         hidden = ("precision", "f1", "false_alarms_per_minute") if open_world else ()
         names = [name for name in members[0][1] if name not in hidden]
-        heads = [_TITLES.get(name, name) + _scale(units[name])[0] for name in names]
+        heads = [TITLES.get(name, name) + scale(units[name])[0] for name in names]
         extra = (["chance recall"] if open_world else []) + ["n", "frames", "p50 (us)", "p99 (us)"]
         rows = []
         for about, found in members:
-            cells = [
-                interval(e.value, e.low, e.high, *_scale(units[name])[1:]) for name in names for e in [found[name]]
-            ]
+            cells = [interval(e.value, e.low, e.high, *scale(units[name])[1:]) for name in names for e in [found[name]]]
             cells += [number(about["chance_recall"], 3)] if open_world else []
             frames = f"{about['scored_frames']} of {about['frames']}"
             cells += [str(found["mae"].n), frames, number(about["p50_us"], 0), number(about["p99_us"], 0)]
             rows.append((shown(about["detector"]), *cells))
-        title = f"{shown(dataset)}, {source.upper()}: {scoring} scoring, {_TABLES[table]}"
+        title = f"{shown(dataset)}, {source.upper()}: {scoring} scoring, {TABLES[table]}"
         yield Sheet(title, ("detector", *heads, *extra), tuple(rows), tuple(_leaderboard_notes(members, open_world)))
 
 
@@ -121,30 +102,6 @@ def _leaderboard_notes(members: list[tuple[dict[str, Any], Any]], open_world: bo
                 f"{about['unprocessed']} of them with known truth"
             )
     yield "Times hold on this machine only."
-
-
-def _paper_tables(report: Report) -> Iterator[Sheet]:
-    table = report.paper_tables
-    if table.empty:
-        return
-    names = ("mae", "p90", "p95", "sd", "precision", "recall", "f1")
-    units = {name: _scale(report.metrics[name].unit) for name in STANDARD}
-    heads = tuple(_TITLES[name] + units[name][0] for name in names)
-    for kind in table["table"].unique():
-        rows = [
-            (
-                shown(row["detector"]),
-                row["scoring"],
-                shown(row["dataset"]),
-                number(row["channel"], 0),
-                shown(row["material"]),
-                row["source"],
-                *(number(row[name], *units[name][1:]) for name in names),
-            )
-            for row in table[table["table"] == kind].to_dict("records")
-        ]
-        columns = ("detector", "scoring", "dataset", "channel", "material", "source", *heads)
-        yield Sheet(f"By channel and material, {_TABLES[kind]}", columns, tuple(rows))
 
 
 def _latency(report: Report) -> Sheet:

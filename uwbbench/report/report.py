@@ -22,6 +22,8 @@ import numpy as np
 
 from uwbbench import registry
 from uwbbench.metrics.error import MeanAbsoluteError, matched_only
+from uwbbench.report import published
+from uwbbench.report.limits import Limits
 from uwbbench.report.results import Scored, scored
 from uwbbench.stats import Estimate, bootstrap, evaluate
 from uwbbench.store.folder import RunFolder
@@ -143,6 +145,35 @@ class Report:
         return pd.DataFrame(rows)
 
     @cached_property
+    def repeats_the_paper(self) -> bool:
+        """Whether the run covers every row of the paper's tables."""
+        table = self.paper_tables
+        rows = set() if table.empty else set(zip(table["channel"], table["material"], strict=True))
+        return rows >= set(published.ROWS)
+
+    @cached_property
+    def chains(self) -> pd.DataFrame:
+        """Detections left behind each step, one row for each detector, dataset and step, captures added up."""
+        import pandas as pd
+
+        counts: dict[tuple[str, str, str], int] = defaultdict(int)
+        for entry in self._of_kind("accuracy"):
+            for step, count in entry.facts["chain"].items():
+                counts[entry.detector, entry.dataset, step] += count
+            clustered = self.folder.detections(entry.unit)["cluster"] >= 0
+            if "dbscan" in entry.facts["chain"]:
+                counts[entry.detector, entry.dataset, "in clusters"] += int(clustered.sum())
+        rows = [(*key, count) for key, count in counts.items()]
+        datasets = [used["label"] for used in self.experiment["datasets"]]
+        rows.sort(key=lambda row: (self.detectors.index(row[0]), datasets.index(row[1])))
+        return pd.DataFrame(rows, columns=["detector", "dataset", "step", "count"])
+
+    @cached_property
+    def limits(self) -> Limits:
+        """Comparison with physical limits; empty unless the run has test signals."""
+        return Limits(self.folder)
+
+    @cached_property
     def latency(self) -> pd.DataFrame:
         """One row for each detector and capture that was timed."""
         import pandas as pd
@@ -193,6 +224,8 @@ class Report:
             "experiment": self.experiment["name"],
             "leaderboard": rows,
             "paper_tables": self.paper_tables.to_dict("records"),
+            "chains": self.chains.to_dict("records"),
+            "limits": self.limits.to_dict(),
             "latency": [{**facts_of(entry), **entry.facts} for entry in self._of_kind("latency")],
             "failures": [{key: getattr(entry, key) for key in keys} for entry in self.failures],
             "unscored": [{**facts_of(entry), "scoring": s, "reason": reason} for entry, s, reason in self.unscored],
