@@ -10,6 +10,7 @@ detectors: [paper, cfar-os]
 datasets: [{use: approach, params: {speed_m_s: 3.0}}]
 scoring: [frame, peak]
 latency: false
+stability: false
 """
 
 

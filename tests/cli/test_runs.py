@@ -19,6 +19,7 @@ datasets:
   - {use: capture, params: {files: ["*.h5"]}}
 scoring: [frame, object]
 latency: false
+stability: false
 intervals: {resamples: 100}
 """
 

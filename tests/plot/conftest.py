@@ -18,6 +18,7 @@ datasets:
   - {use: approach, name: plywood, params: {speed_m_s: 1.0, material: plywood}}
 scoring: [frame, peak]
 latency: false
+stability: false
 """
 
 

@@ -25,6 +25,7 @@ datasets:
   - {use: limits, name: noise, params: {scene: noise, snr_db: 20, frames: 3000}}
 scoring: object
 latency: false
+stability: false
 """
 
 
@@ -108,7 +109,7 @@ def test_limits_are_shown_as_simulated_and_exported(report: Report) -> None:
 
 
 def test_a_run_without_test_signals_has_no_limits(tmp_path: Path) -> None:
-    text = "schema: 1\ndetectors: [oracle]\ndatasets: [{use: approach, params: {speed_m_s: 3.0}}]\nlatency: false\n"
+    text = "schema: 1\ndetectors: [oracle]\ndatasets: [{use: approach, params: {speed_m_s: 3.0}}]\nlatency: false\nstability: false\n"
     (tmp_path / "plain.yaml").write_text(text)
     made = Report(run_experiment(read_experiment(tmp_path / "plain.yaml"), tmp_path / "run", jobs=1))
     assert made.to_dict()["limits"] == {}

@@ -17,7 +17,7 @@ DATASETS = "".join(
 
 def report_on(folder, datasets: str) -> Report:
     folder.mkdir()
-    text = f"schema: 1\ndetectors: [paper]\ndatasets:\n{datasets}scoring: peak\nlatency: false\n"
+    text = f"schema: 1\ndetectors: [paper]\ndatasets:\n{datasets}scoring: peak\nlatency: false\nstability: false\n"
     (folder / "small.yaml").write_text(text)
     return Report(run_experiment(read_experiment(folder / "small.yaml"), folder / "run", jobs=1))
 

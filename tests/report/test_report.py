@@ -26,7 +26,14 @@ def run(tmp_path: Path) -> Run:
     """Run a small experiment."""
 
     def make(detectors: str, datasets: str = f"[{APPROACH}]", **keys: object) -> RunFolder:
-        lines = {"schema": 1, "detectors": detectors, "datasets": datasets, "latency": "false", **keys}
+        lines = {
+            "schema": 1,
+            "detectors": detectors,
+            "datasets": datasets,
+            "latency": "false",
+            "stability": "false",
+            **keys,
+        }
         (tmp_path / "tiny.yaml").write_text("".join(f"{key}: {value}\n" for key, value in lines.items()))
         return run_experiment(read_experiment(tmp_path / "tiny.yaml"), tmp_path / "run", jobs=1)
 
@@ -194,3 +201,13 @@ def test_a_run_killed_before_its_scores_were_written_says_how_to_go_on(run: Run)
     )
     with pytest.raises(StoreError, match="continue it with --resume"):
         Report(folder).scored  # noqa: B018 - reading is what fails
+
+
+def test_the_hard_cases_are_part_of_the_report_by_default(run: Run) -> None:
+    report = Report(run("['null', cfar-os]", stability="true"))
+    null, cfar = report.stability
+    assert (null["detector"], cfar["detector"]) == ("null", "cfar-os")
+    assert null["usual_hits"] == 0
+    assert cfar["passed"] > 30
+    assert cfar["failed"] == 0
+    assert "## Hard cases" in markdown(report)

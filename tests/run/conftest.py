@@ -63,7 +63,7 @@ def make_experiment(tmp_path: Path) -> Callable[..., Experiment]:
     """Write an experiment file and read it: two detectors on 45 frames, without latency, unless told otherwise."""
 
     def make(detectors: str = "[oracle, paper-filtering]", **keys: Any) -> Experiment:
-        lines = {"schema": 1, "detectors": detectors, "latency": "false"}
+        lines = {"schema": 1, "detectors": detectors, "latency": "false", "stability": "false"}
         lines["datasets"] = "[{use: approach, params: {speed_m_s: 3.0}}]"
         path = tmp_path / "tiny.yaml"
         path.write_text("".join(f"{key}: {value}\n" for key, value in {**lines, **keys}.items()))

@@ -20,6 +20,8 @@ def sheets(report: Report) -> list[Sheet]:
     found = [*_leaderboards(report), *paper_sheets(report), *limits_sheets(report.limits)]
     if not report.latency.empty:
         found.append(_latency(report))
+    if report.stability:
+        found.append(_stability(report))
     if report.failures:
         failed = tuple(
             (str(e.kind), shown(e.detector), shown(e.dataset), shown(e.capture), _line(e.reason))
@@ -102,6 +104,29 @@ def _leaderboard_notes(members: list[tuple[dict[str, Any], Any]], open_world: bo
                 f"{about['unprocessed']} of them with known truth"
             )
     yield "Times hold on this machine only."
+
+
+def _stability(report: Report) -> Sheet:
+    columns: tuple[str, ...] = ("detector", "echo found (%)", "passed", "failed", "not applicable", "largest error (m)")
+    columns += ("largest error (ulp)", "flips by float32 (%)", "flips by one ulp (%)")
+    rows: list[tuple[str, ...]] = []
+    notes: list[str] = []
+    for one in report.stability:
+        name = shown(one["detector"])
+        if "refused" in one:
+            rows.append((name, *["n/a"] * (len(columns) - 1)))
+            notes.append(f"{name} cannot run on the capture of the hard cases: {_line(one['refused'])}")
+            continue
+        counts = [str(one[key]) for key in ("passed", "failed", "not_applicable")]
+        sizes = ["n/a" if one[key] is None else f"{one[key]:.1e}" for key in ("largest_error_m", "largest_error_ulp")]
+        flips = [number(one[key], 2, 100.0) for key in ("flips_float32", "flips_one_ulp")]
+        rows.append((name, number(one["usual_hits"], 0, 100.0), *counts, *sizes, *flips))
+        failed = [f"{case['case']} ({_line(case['detail'])})" for case in one["cases"] if case["status"] == "failed"]
+        notes += [f"{name} failed: {shown('; '.join(failed))}"] if failed else []
+    about = (
+        "Inputs at which numerical code breaks, made by uwbbench and SIMULATED; 'uwbbench stability' tells each case."
+    )
+    return Sheet("Hard cases", columns, tuple(rows), (about, *notes))
 
 
 def _latency(report: Report) -> Sheet:

@@ -190,6 +190,12 @@ class Report:
         return pd.DataFrame(rows)
 
     @cached_property
+    def stability(self) -> list[dict[str, Any]]:
+        """How each detector stood the hard cases, in the order of the experiment."""
+        facts = {entry.detector: entry.facts for entry in self._of_kind("stability")}
+        return [{"detector": name} | facts[name] for name in self.detectors if name in facts]
+
+    @cached_property
     def failures(self) -> list[Entry]:
         """Units, and whole datasets, that failed."""
         return [entry for entry in self.entries if entry.status == "failed"]
@@ -227,6 +233,7 @@ class Report:
             "chains": self.chains.to_dict("records"),
             "limits": self.limits.to_dict(),
             "latency": [{**facts_of(entry), **entry.facts} for entry in self._of_kind("latency")],
+            "stability": self.stability,
             "failures": [{key: getattr(entry, key) for key in keys} for entry in self.failures],
             "unscored": [{**facts_of(entry), "scoring": s, "reason": reason} for entry, s, reason in self.unscored],
             "notes": self.notes,

@@ -10,7 +10,7 @@ import threading
 import time
 import traceback
 import uuid
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
@@ -21,9 +21,13 @@ from typing import Any
 from joblib import Parallel, delayed
 
 from uwbbench.api.errors import StoreError, UwbbenchError
+from uwbbench.config.detector import DetectorConfig
 from uwbbench.pipeline import Pipeline
 from uwbbench.run import environment
 from uwbbench.run.experiment import Experiment
+from uwbbench.run.hard_cases import examined
+from uwbbench.run.hard_cases import identity_of as stability_identity
+from uwbbench.run.hard_cases import unit_of as stability_unit
 from uwbbench.run.plan import Plan, Unit, plan, reason_of, rules_of
 from uwbbench.run.scored import table_of
 from uwbbench.run.unit import Finished, Job, content_of, entry_of, identity_of, run_unit
@@ -169,7 +173,7 @@ class _Run:
         self.workers, self.progress = workers, progress
         self.rules = rules_of(experiment)
         self.session = uuid.uuid4().hex
-        self.done = 0
+        self.done = self.total = 0
 
     def carry_out(self) -> None:
         before = {entry.unit: entry for entry in self.folder.entries()}
@@ -180,12 +184,16 @@ class _Run:
             if entry.kind == "listing" and entry.unit not in broken:
                 self.folder.record(dataclasses.replace(entry, status="done", reason=""))
         pending = self._pending(before)
-        self.done = len(self.plan.units) - len(pending)
+        unexamined = self._unexamined(before)
+        self.total = len(self.plan.units) + len(self._examinable)
+        self.done = self.total - len(pending) - len(unexamined)
         accuracy = [unit for unit in pending if unit.kind == "accuracy"]
         try:
             self._detect(accuracy)
         finally:
             self._write_scores()
+        for entry in self._results(delayed(examined)(detector, os.getpid()) for detector in unexamined):
+            self._journal(entry)
         contents = self._contents()
         self.folder.update_manifest(data=contents)
         failed = {
@@ -200,6 +208,29 @@ class _Run:
                 self._journal(entry_of(unit, "failed", reason="not timed, as it could not be run"))
             else:
                 self._time(unit, contents.get(unit.capture_id, ""))
+
+    @property
+    def _examinable(self) -> tuple[DetectorConfig, ...]:
+        """Detectors that the hard cases are put to."""
+        return self.experiment.detectors if self.experiment.stability else ()
+
+    def _unexamined(self, before: dict[str, Entry]) -> list[DetectorConfig]:
+        """Detectors whose stability is not known, or has changed with their sources."""
+        known = {unit: entry.identity for unit, entry in before.items() if entry.status == "done"}
+        return [d for d in self._examinable if known.get(stability_unit(d)) != stability_identity(d)]
+
+    def _results(self, calls: Iterable[Any]) -> Iterator[Any]:
+        """Results of joblib calls as they come in."""
+        todo = list(calls)
+        if not todo:
+            return
+        pool: Any = Parallel(n_jobs=min(self.workers, len(todo)), return_as="generator_unordered", batch_size=1)
+        results = pool(todo)
+        try:
+            yield from results
+        finally:
+            with suppress(BrokenProcessPool):
+                results.close()
 
     def _pending(self, before: dict[str, Entry]) -> list[Unit]:
         """Units to run: all but those that gave the same thing before."""
@@ -226,23 +257,12 @@ class _Run:
     def _detect(self, units: list[Unit]) -> None:
         remaining = {unit.id: unit for unit in units}
         try:
-            for finished in self._parallel(units, min(self.workers, len(units))):
+            for finished in self._results(delayed(run_unit)(self._job(unit)) for unit in units):
                 del remaining[finished.entry.unit]
                 self._store(finished)
         except BrokenProcessPool:  # a worker died; which unit killed it is not known, so the rest runs one by one
             for unit in remaining.values():
                 self._store(self._isolated(unit))
-
-    def _parallel(self, units: list[Unit], processes: int) -> Iterator[Finished]:
-        if not units:
-            return
-        pool: Any = Parallel(n_jobs=processes, return_as="generator_unordered", batch_size=1)
-        results = pool(delayed(run_unit)(self._job(unit)) for unit in units)
-        try:
-            yield from results
-        finally:
-            with suppress(BrokenProcessPool):
-                results.close()
 
     def _isolated(self, unit: Unit) -> Finished:
         """One unit in a process of its own, which it may take down."""
@@ -264,7 +284,7 @@ class _Run:
         self.folder.record(entry)
         self.done += 1
         if self.progress is not None:
-            self.progress(Progress(self.done, len(self.plan.units), entry))
+            self.progress(Progress(self.done, self.total, entry))
 
     def _time(self, unit: Unit, sha256: str) -> None:
         from uwbbench.timing import measure

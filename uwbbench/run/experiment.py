@@ -93,6 +93,7 @@ class ExperimentModel(_Model):
     )
     metrics: list[str] = Field(default_factory=list, description="Registered metrics besides the standard ones.")
     latency: LatencyModel = Field(default_factory=LatencyModel)
+    stability: bool = Field(default=True, description="Put the hard cases to each detector; see 'uwbbench stability'.")
     seed: int = Field(default=0, ge=0, description="Of the resampling behind the intervals.")
     intervals: IntervalModel = Field(default_factory=IntervalModel)
 
@@ -173,6 +174,7 @@ class Experiment:
     strongest : int or None
     metrics : tuple of str
     latency : LatencyModel
+    stability : bool
     seed : int
     intervals : IntervalModel
     """
@@ -187,6 +189,7 @@ class Experiment:
     strongest: int | None
     metrics: tuple[str, ...]
     latency: LatencyModel
+    stability: bool
     seed: int
     intervals: IntervalModel
 
@@ -205,6 +208,7 @@ class Experiment:
             "strongest": self.strongest,
             "metrics": list(self.metrics),
             "latency": self.latency.model_dump(),
+            "stability": self.stability,
             "seed": self.seed,
             "intervals": self.intervals.model_dump(),
         }
@@ -262,6 +266,7 @@ def read_experiment(
         strongest=model.strongest,
         metrics=tuple(dict.fromkeys(model.metrics)),
         latency=model.latency,
+        stability=model.stability,
         seed=model.seed,
         intervals=model.intervals,
     )

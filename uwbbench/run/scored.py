@@ -39,7 +39,7 @@ def table_of(entries: Iterable[Entry], rows_of: Mapping[str, list[dict[str, Any]
     """
     table = []
     for entry in sorted(entries, key=lambda entry: (entry.dataset, entry.capture, entry.detector)):
-        if entry.kind == "latency" or (entry.kind == "listing" and entry.status == "done"):
+        if entry.kind in ("latency", "stability") or (entry.kind == "listing" and entry.status == "done"):
             continue
         about = {"detector": entry.detector, "dataset": entry.dataset, "capture": entry.capture}
         about["source"] = entry.facts.get("source", "")

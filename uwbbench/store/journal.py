@@ -12,7 +12,7 @@ from typing import Any, Literal
 from uwbbench.store.files import disk_errors
 from uwbbench.store.identity import plain
 
-Kind = Literal["accuracy", "latency", "listing"]
+Kind = Literal["accuracy", "stability", "latency", "listing"]
 Status = Literal["done", "failed"]
 
 
@@ -24,8 +24,9 @@ class Entry:
     ----------
     unit : str
         Identifier, also the name of the unit's files.
-    kind : {"accuracy", "latency", "listing"}
-        A listing that fails stands for the captures that it would have named.
+    kind : {"accuracy", "stability", "latency", "listing"}
+        Stability is a detector's alone, without a capture; a listing that fails stands for the captures that it would
+        have named.
     detector, dataset, capture : str
         Names; empty where they do not apply.
     status : {"done", "failed"}

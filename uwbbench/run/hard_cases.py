@@ -1,0 +1,45 @@
+"""The hard cases as part of a run: what each detector makes of them, whatever the captures."""
+
+from __future__ import annotations
+
+from uwbbench import __version__
+from uwbbench.api.errors import UwbbenchError
+from uwbbench.config.detector import DetectorConfig
+from uwbbench.pipeline import Pipeline
+from uwbbench.run.unit import die_with
+from uwbbench.store.identity import digest, file_id
+from uwbbench.store.journal import Entry
+
+
+def unit_of(detector: DetectorConfig) -> str:
+    """Identifier of a detector's entry."""
+    return file_id(["stability", detector.name])
+
+
+def identity_of(detector: DetectorConfig) -> str:
+    """Hash of all that the result depends on: the detector with its sources, and the version of the cases."""
+    return digest(["stability", Pipeline(detector).identity, __version__])
+
+
+def examined(detector: DetectorConfig, parent: int) -> Entry:
+    """Entry of a detector. One that refuses the capture of the cases is no failure: its reason is all there is."""
+    from threadpoolctl import threadpool_limits
+
+    from uwbbench.stability import examine
+
+    die_with(parent)
+    with threadpool_limits(1):
+        try:
+            facts = examine(Pipeline(detector)).to_dict()
+        except UwbbenchError as error:
+            facts = {"refused": str(error)}
+    return Entry(
+        unit=unit_of(detector),
+        kind="stability",
+        detector=detector.name,
+        dataset="",
+        capture="",
+        status="done",
+        identity=identity_of(detector),
+        facts=facts,
+    )
