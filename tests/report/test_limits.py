@@ -109,7 +109,8 @@ def test_limits_are_shown_as_simulated_and_exported(report: Report) -> None:
 
 
 def test_a_run_without_test_signals_has_no_limits(tmp_path: Path) -> None:
-    text = "schema: 1\ndetectors: [oracle]\ndatasets: [{use: approach, params: {speed_m_s: 3.0}}]\nlatency: false\nstability: false\n"
+    head = "schema: 1\ndetectors: [oracle]\nlatency: false\nstability: false\n"
+    text = head + "datasets: [{use: approach, params: {speed_m_s: 3.0}}]\n"
     (tmp_path / "plain.yaml").write_text(text)
     made = Report(run_experiment(read_experiment(tmp_path / "plain.yaml"), tmp_path / "run", jobs=1))
     assert made.to_dict()["limits"] == {}
