@@ -103,7 +103,7 @@ def test_truth_that_is_not_exhaustive_shows_recall_beside_chance_and_no_precisio
     truth = dataclasses.replace(approach.truth, exhaustive=False)
     write_capture(tmp_path / "open.h5", dataclasses.replace(approach, truth=truth))
     report = Report(run("[paper-filtering]", "[{use: capture, params: {files: [open.h5]}}]", scoring="frame"))
-    (sheet, paper) = sheets(report)
+    sheet, paper, _ = sheets(report)
     assert "precision" not in sheet.columns
     assert "F1" not in sheet.columns
     assert {"recall", "chance recall"} <= set(sheet.columns)
@@ -211,3 +211,11 @@ def test_the_hard_cases_are_part_of_the_report_by_default(run: Run) -> None:
     assert cfar["passed"] > 30
     assert cfar["failed"] == 0
     assert "## Hard cases" in markdown(report)
+
+
+def test_captures_are_listed_with_licence_and_description(run: Run) -> None:
+    report = Report(run("['null']"))
+    (capture,) = report.captures
+    assert capture["source"] == "simulated"
+    assert capture["license"] == "BSD-3-Clause"
+    assert capture["description"] in markdown(report)

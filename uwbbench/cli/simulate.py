@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -34,7 +35,7 @@ def simulate(
         shown = ", ".join(name.split("/")[1] for name in names[:6])
         raise ConfigError(f"{path}: varies into {len(names)} captures ({shown}, ...); fix what 'vary' lists with --set")
     simulation = dataset.simulate(names[0], threads=jobs)
-    write_capture(output, *simulation.captures)
+    write_capture(output, *(replace(capture, name=names[0]) for capture in simulation.captures))
     record = {"output": str(output), "source": "simulated", **simulation.record()}
     if json:
         render.print_json(record)

@@ -22,6 +22,10 @@ def sheets(report: Report) -> list[Sheet]:
         found.append(_latency(report))
     if report.stability:
         found.append(_stability(report))
+    if report.captures:
+        keys = ("dataset", "capture", "source", "frames", "license", "description")
+        rows = tuple(tuple(_line(str(one[key])) for key in keys) for one in report.captures)
+        found.append(Sheet("Captures", keys, rows))
     if report.failures:
         failed = tuple(
             (str(e.kind), shown(e.detector), shown(e.dataset), shown(e.capture), _line(e.reason))

@@ -190,6 +190,21 @@ class Report:
         return pd.DataFrame(rows)
 
     @cached_property
+    def captures(self) -> list[dict[str, Any]]:
+        """What was compared on; the description of a simulated scene says which terms were kept, and at what cost."""
+        rows: dict[str, dict[str, Any]] = {}
+        for entry in self._of_kind("accuracy"):
+            if entry.capture_id not in rows:
+                header = self.folder.header(entry.capture_id)
+                about = {key: getattr(header, key) for key in ("source", "license", "citation", "description")}
+                rows[entry.capture_id] = {
+                    "dataset": entry.dataset,
+                    "capture": entry.capture,
+                    "frames": len(header),
+                } | about
+        return sorted(rows.values(), key=lambda row: (row["dataset"], row["capture"]))
+
+    @cached_property
     def stability(self) -> list[dict[str, Any]]:
         """How each detector stood the hard cases, in the order of the experiment."""
         facts = {entry.detector: entry.facts for entry in self._of_kind("stability")}
@@ -233,6 +248,7 @@ class Report:
             "chains": self.chains.to_dict("records"),
             "limits": self.limits.to_dict(),
             "latency": [{**facts_of(entry), **entry.facts} for entry in self._of_kind("latency")],
+            "captures": self.captures,
             "stability": self.stability,
             "failures": [{key: getattr(entry, key) for key in keys} for entry in self.failures],
             "unscored": [{**facts_of(entry), "scoring": s, "reason": reason} for entry, s, reason in self.unscored],
