@@ -20,10 +20,11 @@ lint: $(VENV)/ready
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
-# The main job on built-in data: four detectors on two simulated approaches, a table, and a run folder to look into.
+# The main job on built-in data: four detectors on simulated approaches, a table, a picture, a run folder to look into.
 demo: $(VENV)/ready
 	rm -rf demo
 	$(BIN)/uwbbench run configs/experiments/demo.yaml --out demo
+	$(BIN)/uwbbench plot cdf demo -o demo/errors.png
 
 clean:
 	rm -rf $(VENV) demo build dist
