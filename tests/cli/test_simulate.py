@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from uwbbench.api import open_capture
+from uwbbench.config.locate import config_folder
 
 SCENE = """\
 schema: 1
@@ -91,3 +92,12 @@ def test_a_scene_is_validated_like_the_other_files(uwbbench, scene) -> None:
     assert "scene of 2 captures, fine" in uwbbench("validate", scene.name).stdout
     scene.write_text(SCENE.replace("use: noise", "use: noisy"))
     assert "Did you mean 'noise'" in uwbbench("validate", scene.name, code=2).stderr
+
+
+def test_a_grid_behind_lost_frames_is_refused_in_one_message(uwbbench, tmp_path: Path) -> None:
+    text = (config_folder() / "scenes" / "plate.yaml").read_text()
+    lossy = text.replace("  - use: grid\n", "  - {use: frames.lost, params: {share: 0.2}}\n  - use: grid\n")
+    assert lossy != text
+    (tmp_path / "lossy.yaml").write_text(lossy)
+    said = uwbbench("simulate", "lossy.yaml", "-o", "lossy.h5", code=2).stderr
+    assert "term 'grid' must stand before the terms that lose or repeat frames" in said

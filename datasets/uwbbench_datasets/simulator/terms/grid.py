@@ -7,7 +7,7 @@ import dataclasses
 import numpy as np
 from pydantic import Field
 
-from uwbbench.api import Capture, FloatArray, Params, Term, View
+from uwbbench.api import Capture, CaptureError, FloatArray, Params, Term, View
 
 
 class GridParams(Params):
@@ -30,7 +30,15 @@ class Grid(Term[GridParams]):
         return view.replace(crest_tap=self._crest_tap)
 
     def record(self, capture: Capture, rng: np.random.Generator) -> Capture:
-        """Report the first path of each response, each with its own error."""
+        """Report the first path of each response, each with its own error.
+
+        Raises
+        ------
+        CaptureError
+            If frames were lost or repeated before.
+        """
+        if len(capture) != len(self._crest_tap):
+            raise CaptureError("term 'grid' must stand before the terms that lose or repeat frames")
         steps = self.params.resolution
 
         def reported() -> FloatArray:
