@@ -26,9 +26,9 @@ from uwbbench.api import (
     Truth,
     nearest,
 )
+from uwbbench.api.radar import CHANNEL_CENTER_HZ
 
 SAMPLE_INTERVAL_S = 1 / (2 * 499.2e6)
-CARRIER_HZ = {5: 6489.6e6, 9: 7987.2e6}
 REFLECTION = {"metal": 1.0, "concrete": 0.394 / 2, "plywood": 0.26 / 1.41}
 """Half-space reflection at normal incidence (ITU-R P.2040-3), less a fitted shape loss of 6 dB and 3 dB for boxes."""
 TAPS, CREST_TAP, NOISE_TAPS = 50, 7.0, 4
@@ -90,7 +90,7 @@ class Approach(Dataset[ApproachParams]):
         trajectory = Trajectory(np.arange(frames) / p.frame_rate_hz, position_m, np.zeros(frames))
         radar = Radar(
             model="simulated DW3000",
-            center_frequency_hz=CARRIER_HZ[p.channel],
+            center_frequency_hz=CHANNEL_CENTER_HZ[p.channel],
             bandwidth_hz=499.2e6,
             sample_interval_s=SAMPLE_INTERVAL_S,
             frame_rate_hz=p.frame_rate_hz,

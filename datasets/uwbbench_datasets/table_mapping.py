@@ -16,12 +16,11 @@ import numpy as np
 from pydantic import Field, field_validator, model_validator
 
 from uwbbench.api import CaptureError, ConfigError, FloatArray, Obstacle, Params, YamlFile, checked, read_yaml
+from uwbbench.api.radar import CHANNEL_CENTER_HZ
 
 Vector = tuple[float, float, float]
 Point = tuple[float, float]
 
-CENTER_FREQUENCY_HZ = {5: 6489.6e6, 9: 7987.2e6}
-"""Carriers of the two IEEE 802.15.4 channels that DW3000 radios have (IEEE 802.15.4-2020, HRP UWB band plan)."""
 TIME_S = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 LENGTH_M = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
 ANGLE_RAD = {"rad": 1.0, "deg": math.pi / 180}
@@ -64,7 +63,7 @@ class RadarFacts(Params):
         given = self.center_frequency_hz
         if isinstance(given, float | int):
             return float(given)
-        known = {**CENTER_FREQUENCY_HZ, **(given or {})}
+        known = {**CHANNEL_CENTER_HZ, **(given or {})}
         if channel not in known:
             raise CaptureError(f"radar.center_frequency_hz is missing for channel {channel}")
         return known[channel]

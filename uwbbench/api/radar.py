@@ -15,6 +15,9 @@ from uwbbench.api.geometry import SPEED_OF_LIGHT_M_S, rotate_z
 
 Vector = tuple[float, float, float]
 
+CHANNEL_CENTER_HZ = {5: 6489.6e6, 9: 7987.2e6}
+"""Carriers of the two channels that DW3000 radios have (IEEE 802.15.4-2020, HRP UWB band plan)."""
+
 
 @dataclass(frozen=True)
 class Radar:

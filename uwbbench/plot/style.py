@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-COLUMN_IN, PAGE_IN = 3.5, 7.16
-"""Widths of one column and of both, in inches."""
+PAGE_IN = 7.16
+"""Width of a page of two columns, in inches."""
 
 BLACK, ORANGE, SKY, GREEN, YELLOW, BLUE, VERMILION, PURPLE = (
     "#000000",

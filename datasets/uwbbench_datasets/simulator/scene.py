@@ -12,13 +12,13 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from uwbbench.api import ConfigError, Params, PluginError, Pulse, Radar, Term, YamlFile, checked, read_yaml
+from uwbbench.api.radar import CHANNEL_CENTER_HZ
 from uwbbench.config.override import with_values
 from uwbbench.registry import load
 from uwbbench_datasets.simulator.pulses import GaussianPulse, RaisedCosinePulse
 from uwbbench_datasets.simulator.shapes import ObjectModel
 from uwbbench_datasets.simulator.trajectory import Point, TrajectoryModel, in_space
 
-CARRIER_HZ = {5: 6489.6e6, 9: 7987.2e6}
 CHIP_S = 1 / 499.2e6
 """Chip duration of IEEE 802.15.4 HRP UWB: two taps."""
 _MOST_VARIANTS = 10_000
@@ -158,7 +158,7 @@ class Scene:
         shared, mount = self.model.radar, self.model.receivers[receiver]
         return Radar(
             model="simulated DW3000",
-            center_frequency_hz=CARRIER_HZ[shared.channel],
+            center_frequency_hz=CHANNEL_CENTER_HZ[shared.channel],
             bandwidth_hz=1 / CHIP_S,
             sample_interval_s=CHIP_S / 2,
             frame_rate_hz=shared.frame_rate_hz,

@@ -23,7 +23,7 @@ class Antenna(Term[AntennaParams]):
     receiving pattern takes from it as isolation.
     """
 
-    def prepare(self, view: View, rng: np.random.Generator) -> View:  # noqa: ARG002
+    def prepare(self, view: View, rng: np.random.Generator) -> View:
         """Shape the receiving gain and lift all paths by the transmitter's."""
         p = self.params
         transmit = 10 ** (p.transmit_gain_dbi / 20)

@@ -29,7 +29,7 @@ class ArrayResponse(Term[ArrayParams]):
     an error that differs between left and right; its sizes are chosen, not fitted to one board.
     """
 
-    def prepare(self, view: View, rng: np.random.Generator) -> View:  # noqa: ARG002
+    def prepare(self, view: View, rng: np.random.Generator) -> View:
         """Replace the array's phase."""
         p = self.params
         ideal = view.array_phase

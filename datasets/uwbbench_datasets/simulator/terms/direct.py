@@ -20,7 +20,7 @@ class Direct(Term[DirectParams]):
     All levels that other terms state relative to the direct path follow this attenuation.
     """
 
-    def prepare(self, view: View, rng: np.random.Generator) -> View:  # noqa: ARG002
+    def prepare(self, view: View, rng: np.random.Generator) -> View:
         """Attenuate the direct path."""
         return view.replace(direct_amplitude=view.direct_amplitude * 10 ** (-self.params.isolation_db / 20))
 
@@ -28,7 +28,7 @@ class Direct(Term[DirectParams]):
         """Its amplitude, which is constant."""
         return view.direct_amplitude
 
-    def paths(self, view: View, rng: np.random.Generator) -> Paths:  # noqa: ARG002
+    def paths(self, view: View, rng: np.random.Generator) -> Paths:
         """One path at zero delay."""
         toward = view.radar.baseline_m
         azimuth_rad = np.arctan2(toward[1], toward[0])

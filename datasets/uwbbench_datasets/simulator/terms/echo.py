@@ -70,7 +70,7 @@ class _Echo(Term[P]):
         found = self._all(view, bound=True)
         return 0.0 if found is None else float(np.max(np.sum(np.abs(found.amplitude), axis=1)))
 
-    def paths(self, view: View, rng: np.random.Generator) -> Paths | None:  # noqa: ARG002
+    def paths(self, view: View, rng: np.random.Generator) -> Paths | None:
         """One path for each face or body."""
         return self._all(view, bound=False)
 
@@ -137,7 +137,7 @@ class PointEcho(_Echo[PointParams]):
 
     shapes: ClassVar = ("point",)
 
-    def _echo(self, thing: SceneObject, view: View, *, bound: bool) -> tuple[FloatArray, FloatArray]:  # noqa: ARG002
+    def _echo(self, thing: SceneObject, view: View, *, bound: bool) -> tuple[FloatArray, FloatArray]:
         out = np.linalg.norm(thing.center_m - view.transmitter_m, axis=1)
         back = np.linalg.norm(thing.center_m - view.receiver_m, axis=1)
         scale = view.radar.wavelength_m * np.sqrt(self.params.rcs_m2) / (4 * np.pi) ** 1.5

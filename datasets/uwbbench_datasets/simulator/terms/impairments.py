@@ -17,7 +17,7 @@ class ClippingParams(Params):
 class Clipping(Term[ClippingParams]):
     """Saturation: I and Q each stop at a level, as registers do."""
 
-    def apply(self, responses: Responses, view: View, rng: np.random.Generator) -> Responses:  # noqa: ARG002
+    def apply(self, responses: Responses, view: View, rng: np.random.Generator) -> Responses:
         """Clip every response."""
         limit = self.params.level * view.direct_amplitude
 
@@ -40,7 +40,7 @@ class Quantisation(Term[QuantisationParams]):
     def _step(self, view: View) -> float:
         return float(self.params.full_scale * view.direct_amplitude / 2 ** (self.params.bits - 1))
 
-    def apply(self, responses: Responses, view: View, rng: np.random.Generator) -> Responses:  # noqa: ARG002
+    def apply(self, responses: Responses, view: View, rng: np.random.Generator) -> Responses:
         """Round every response to the steps of two's complement numbers."""
         step, last = self._step(view), 2 ** (self.params.bits - 1)
 

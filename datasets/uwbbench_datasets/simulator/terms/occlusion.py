@@ -25,7 +25,7 @@ class Occlusion(Term[OcclusionParams]):
     ground truth calls an object occluded.
     """
 
-    def prepare(self, view: View, rng: np.random.Generator) -> View:  # noqa: ARG002
+    def prepare(self, view: View, rng: np.random.Generator) -> View:
         """Weaken each object in the frames in which it is hidden."""
         left = 0.0 if self.params.transmission_db is None else 10 ** (self.params.transmission_db / 20)
         return view.replace(visibility=view.visibility * np.where(hidden(view), left, 1.0))

@@ -49,7 +49,7 @@ class Ringing(Term[RingingParams]):
         """All returns in phase, at the top of their drift."""
         return float(np.sum(np.abs(self._amplitude(view))) * (1 + self.params.drift))
 
-    def paths(self, view: View, rng: np.random.Generator) -> Paths:  # noqa: ARG002
+    def paths(self, view: View, rng: np.random.Generator) -> Paths:
         """One path for each return."""
         turn = 2 * np.pi * view.timestamp_s[:, None] / self.params.drift_period_s + self._turn
         amplitude = self._amplitude(view) * (1 + self.params.drift * np.sin(turn))

@@ -43,7 +43,7 @@ class WallEcho(Term[WallParams]):
         found = self._all(view, bound=True)
         return 0.0 if found is None else float(np.max(np.sum(np.abs(found.amplitude), axis=1)))
 
-    def paths(self, view: View, rng: np.random.Generator) -> Paths | None:  # noqa: ARG002
+    def paths(self, view: View, rng: np.random.Generator) -> Paths | None:
         """One path for each side of each wall."""
         return self._all(view, bound=False)
 
@@ -106,7 +106,7 @@ class WallClutter(Term[ClutterParams]):
         largest = [np.max(np.sum(np.abs(found.amplitude), axis=1)) for found in self._each(view)]
         return float(np.sum(largest))
 
-    def paths(self, view: View, rng: np.random.Generator) -> Paths | None:  # noqa: ARG002
+    def paths(self, view: View, rng: np.random.Generator) -> Paths | None:
         """One path for each scatterer, from the sides of walls that face the radar."""
         found = list(self._each(view))
         if not found:
