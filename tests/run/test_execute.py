@@ -252,3 +252,15 @@ def test_what_cannot_be_run_is_not_timed(
     accuracy, latency = folder.entries()
     assert "ValueError: no luck" in accuracy.traceback
     assert (latency.status, latency.reason) == ("failed", "not timed, as it could not be run")
+
+
+def test_a_detector_that_breaks_over_the_hard_cases_is_a_failed_row_and_the_others_are_examined(
+    make_experiment: MakeExperiment, detector_file: DetectorFile, tmp_path: Path, misbehaving: Path
+) -> None:
+    bad = detector_file("bad", "{use: misbehaving.raise}")
+    experiment = make_experiment(f"[{bad}, 'null']", stability="true")
+    folder = run_experiment(experiment, tmp_path / "run", jobs=1)
+    examined = {entry.detector: entry for entry in folder.entries() if entry.kind == "stability"}
+    assert (examined["bad"].status, examined["null"].status) == ("failed", "done")
+    assert "no luck" in examined["bad"].reason
+    assert examined["null"].facts["failed"] == 0

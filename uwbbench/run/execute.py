@@ -26,6 +26,7 @@ from uwbbench.pipeline import Pipeline
 from uwbbench.run import environment
 from uwbbench.run.experiment import Experiment
 from uwbbench.run.hard_cases import examined
+from uwbbench.run.hard_cases import failed as unexamined
 from uwbbench.run.hard_cases import identity_of as stability_identity
 from uwbbench.run.hard_cases import unit_of as stability_unit
 from uwbbench.run.plan import Plan, Unit, plan, reason_of, rules_of
@@ -184,16 +185,15 @@ class _Run:
             if entry.kind == "listing" and entry.unit not in broken:
                 self.folder.record(dataclasses.replace(entry, status="done", reason=""))
         pending = self._pending(before)
-        unexamined = self._unexamined(before)
+        untried = self._unexamined(before)
         self.total = len(self.plan.units) + len(self._examinable)
-        self.done = self.total - len(pending) - len(unexamined)
+        self.done = self.total - len(pending) - len(untried)
         accuracy = [unit for unit in pending if unit.kind == "accuracy"]
         try:
             self._detect(accuracy)
         finally:
             self._write_scores()
-        for entry in self._results(delayed(examined)(detector, os.getpid()) for detector in unexamined):
-            self._journal(entry)
+        self._examine(untried)
         contents = self._contents()
         self.folder.update_manifest(data=contents)
         failed = {
@@ -218,6 +218,18 @@ class _Run:
         """Detectors whose stability is not known, or has changed with their sources."""
         known = {unit: entry.identity for unit, entry in before.items() if entry.status == "done"}
         return [d for d in self._examinable if known.get(stability_unit(d)) != stability_identity(d)]
+
+    def _examine(self, detectors: list[DetectorConfig]) -> None:
+        """Put the hard cases to detectors; one that takes its process down does not take the others' results."""
+        remaining = {stability_unit(detector): detector for detector in detectors}
+        try:
+            for entry in self._results(delayed(examined)(detector, os.getpid()) for detector in detectors):
+                del remaining[entry.unit]
+                self._journal(entry)
+        except BrokenProcessPool as error:
+            reason = f"{type(error).__name__}: a process died over the hard cases of this detector or one beside it"
+            for detector in remaining.values():
+                self._journal(unexamined(detector, reason))
 
     def _results(self, calls: Iterable[Any]) -> Iterator[Any]:
         """Results of joblib calls as they come in."""

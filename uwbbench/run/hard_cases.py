@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import dataclasses
+import traceback
+
 from uwbbench import __version__
 from uwbbench.api.errors import UwbbenchError
 from uwbbench.config.detector import DetectorConfig
 from uwbbench.pipeline import Pipeline
+from uwbbench.run.plan import reason_of
 from uwbbench.run.unit import die_with
 from uwbbench.store.identity import digest, file_id
 from uwbbench.store.journal import Entry
@@ -22,24 +26,34 @@ def identity_of(detector: DetectorConfig) -> str:
 
 
 def examined(detector: DetectorConfig, parent: int) -> Entry:
-    """Entry of a detector. One that refuses the capture of the cases is no failure: its reason is all there is."""
+    """Entry of a detector.
+
+    One that refuses the capture of the cases is no failure: its reason is all there is. One that breaks is.
+    """
     from threadpoolctl import threadpool_limits
 
     from uwbbench.stability import examine
 
     die_with(parent)
-    with threadpool_limits(1):
-        try:
+    try:
+        with threadpool_limits(1):
             facts = examine(Pipeline(detector)).to_dict()
-        except UwbbenchError as error:
-            facts = {"refused": str(error)}
+    except UwbbenchError as error:
+        facts = {"refused": str(error)}
+    except Exception as error:  # noqa: BLE001 - a plugin may raise anything; the other detectors are still examined
+        return failed(detector, reason_of(error), traceback.format_exc())
+    return dataclasses.replace(failed(detector), status="done", identity=identity_of(detector), facts=facts)
+
+
+def failed(detector: DetectorConfig, reason: str = "", trace: str = "") -> Entry:
+    """Entry of a detector that could not be examined."""
     return Entry(
         unit=unit_of(detector),
         kind="stability",
         detector=detector.name,
         dataset="",
         capture="",
-        status="done",
-        identity=identity_of(detector),
-        facts=facts,
+        status="failed",
+        reason=reason,
+        traceback=trace,
     )
