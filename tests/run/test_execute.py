@@ -264,3 +264,14 @@ def test_a_detector_that_breaks_over_the_hard_cases_is_a_failed_row_and_the_othe
     assert (examined["bad"].status, examined["null"].status) == ("failed", "done")
     assert "no luck" in examined["bad"].reason
     assert examined["null"].facts["failed"] == 0
+
+
+def test_a_detector_that_kills_its_process_over_the_hard_cases_does_not_end_the_run(
+    make_experiment: MakeExperiment, detector_file: DetectorFile, tmp_path: Path, misbehaving: Path
+) -> None:
+    bad = detector_file("bad", "{use: misbehaving.crash}")
+    experiment = make_experiment(f"[{bad}, 'null']", stability="true")
+    folder = run_experiment(experiment, tmp_path / "run", jobs=2)
+    status = {(entry.kind, entry.detector): entry.status for entry in folder.entries()}
+    assert status["stability", "bad"] == "failed"
+    assert status["accuracy", "null"] == "done"
