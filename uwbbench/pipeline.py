@@ -1,4 +1,4 @@
-"""A detector assembled from stages: the same code as a batch and as a stream."""
+"""A detector assembled from stages: checked, opened on a receiver, run as a batch."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import hashlib
 import json
 import sys
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -18,9 +18,10 @@ from uwbbench.api.block import Block
 from uwbbench.api.capture import Capture, CaptureHeader
 from uwbbench.api.detections import COLUMNS, Detections
 from uwbbench.api.errors import ConfigError, PluginError
-from uwbbench.api.frames import Frames
-from uwbbench.api.stage import Filter, Stage
+from uwbbench.api.kernel import Kernel
+from uwbbench.api.stage import Stage
 from uwbbench.config.detector import DetectorConfig, detector_from_text, read_detector
+from uwbbench.stream import Opened, Stream, without_invalid
 
 BATCH_FRAMES = 4096
 """Frames a block of :meth:`Pipeline.run`: large enough to be fast, small enough for a million frames."""
@@ -30,107 +31,6 @@ _NEEDS = {
     "truth": "ground truth",
     "first_path": "reported first path",
 }
-
-
-@dataclass(frozen=True)
-class _Opened:
-    label: str
-    stage: Stage[Any]
-
-
-class Stream:
-    """A detector at work on one receiver, block by block.
-
-    Made by :meth:`Pipeline.open`; not shared between threads.
-    """
-
-    def __init__(self, stages: list[_Opened], notes: list[str], *, audit: bool = False) -> None:
-        self._stages = stages
-        self._notes = notes
-        self._audit = audit
-        self._rejected: list[Detections] = []
-        self.chain: dict[str, int] = {}
-
-    def step(self, frames: Frames) -> Detections:
-        """Detections that are ready after these frames.
-
-        Parameters
-        ----------
-        frames : Frames
-            The next consecutive frames, one or many.
-
-        Returns
-        -------
-        Detections
-            Usually of these frames; of earlier ones behind a stage that holds detections back.
-        """
-        return self._emit(self._through(Block(_without_invalid(frames)), 0))
-
-    def flush(self) -> Detections:
-        """Detections that were still held back; ends the stream."""
-        return Detections.join([self._emit(tail) for tail in self._tails()]).annotated(notes=self.notes)
-
-    @property
-    def ports(self) -> frozenset[str]:
-        """All that the stages produce."""
-        return frozenset().union(*(stage.produces for stage in self.stages))
-
-    @property
-    def stages(self) -> tuple[Stage[Any], ...]:
-        """The stages at work, in order."""
-        return tuple(opened.stage for opened in self._stages)
-
-    @property
-    def notes(self) -> tuple[str, ...]:
-        """What a reader of the results must know, so far."""
-        return tuple(dict.fromkeys([*self._notes, *(note for o in self._stages for note in o.stage.notes)]))
-
-    @property
-    def rejected(self) -> Detections:
-        """Detections that filters dropped, kept only in an audit.
-
-        ``rejected_by`` is the place of the filter in ``chain``.
-        """
-        return Detections.join(self._rejected)
-
-    def _tails(self) -> Iterator[Block]:
-        """What stages still hold back, each taken through the stages behind it."""
-        for index, opened in enumerate(self._stages):
-            tail = opened.stage.flush()
-            if tail is not None:
-                tail = _without_rows_of_invalid(tail)
-                if opened.label in self.chain:
-                    self.chain[opened.label] += len(tail.detections)
-                yield self._through(tail, index + 1)
-
-    def _emit(self, block: Block) -> Detections:
-        return block.detections.annotated(processed=block.frames.index[block.frames.valid], notes=self.notes)
-
-    def _through(self, block: Block, start: int) -> Block:
-        rejected: list[Block] = []
-        for opened in self._stages[start:]:
-            stage = opened.stage
-            if self._audit and isinstance(stage, Filter):
-                keep = stage.keep(block)
-                dropped = block.detections.take(~keep)
-                place = np.full(len(dropped), self._place(opened.label))
-                rejected.append(block.replace(detections=dropped.with_columns(rejected_by=place)))
-                block = block.replace(detections=block.detections.take(keep))
-            else:
-                if stage.rowwise:
-                    rejected = [stage.step(part) for part in rejected]
-                block = stage.step(block)
-                rejected = [_brought_along(part, block) for part in rejected]
-            if "detections" in stage.produces:
-                block = _without_rows_of_invalid(block)
-            if "detections" in stage.produces or self.chain:
-                self.chain[opened.label] = self.chain.get(opened.label, 0) + len(block.detections)
-        self._rejected += [part.detections for part in rejected]
-        return block
-
-    def _place(self, label: str) -> int:
-        """Place of a step in the chain, where it stands from its first block on."""
-        return list(self.chain).index(label) if label in self.chain else len(self.chain)
 
 
 class Pipeline:
@@ -180,7 +80,7 @@ class Pipeline:
         if "detections" not in available:
             raise ConfigError(f"detector '{self.name}': no step produces detections")
 
-    def open(self, capture: CaptureHeader, *, audit: bool = False) -> Stream:
+    def open(self, capture: CaptureHeader, *, audit: bool = False, fused: bool = True, threads: int = 1) -> Stream:
         """Start a stream on a receiver.
 
         Parameters
@@ -189,12 +89,23 @@ class Pipeline:
             Gives the radar; its samples are not touched.
         audit : bool
             Keep what the filters drop, in ``stream.rejected``.
+        fused : bool
+            Let kernels take over the runs of stages that they know. They find the same; an audit goes without.
+        threads : int
+            Threads that a kernel may share a long block among.
 
         Raises
         ------
         ConfigError
             If the capture lacks what a stage needs and the stage is not optional.
         """
+        steps, notes = self._opened(capture)
+        if fused and not audit:
+            steps = _fused(steps, notes, threads)
+        return Stream(steps, notes, audit=audit)
+
+    def _opened(self, capture: CaptureHeader) -> tuple[list[Opened], list[str]]:
+        """The stages, opened on the receiver, and what a reader of the results must know of them."""
         radar = capture.radar
         counted_from_transmission = radar.first_tap_delay_s is not None
         has = {
@@ -233,11 +144,11 @@ class Pipeline:
             if "truth" in cls.needs and capture.truth is not None:
                 stage.show_truth(capture.truth, capture.trajectory)
             available = (available - stage.removes) | stage.produces
-            stages.append(_Opened(step.label, stage))
+            stages.append(Opened(step.label, stage))
         notes += [f"left out, as the capture has no {reason}: {', '.join(names)}" for reason, names in left_out.items()]
-        return Stream(stages, notes, audit=audit)
+        return stages, notes
 
-    def run(self, capture: Capture, *, candidates: bool = False) -> Detections:
+    def run(self, capture: Capture, *, candidates: bool = False, fused: bool = True, threads: int = 1) -> Detections:
         """Detect on a whole capture.
 
         Parameters
@@ -245,21 +156,31 @@ class Pipeline:
         capture : Capture
         candidates : bool
             Find the peaks before the filters in the same run; otherwise they are found when somebody asks.
+        fused, threads
+            As in :meth:`open`.
 
         Returns
         -------
         Detections
             What the stream yields for the same frames, all blocks and the flush together.
         """
-        stream = self.open(capture, audit=candidates)
-        parts = [stream.step(frames) for frames in capture.blocks(BATCH_FRAMES)]
+        stream = self.open(capture, audit=candidates, fused=fused, threads=threads)
+        parts = [stream.step(frames) for frames in capture.blocks(BATCH_FRAMES, sts="sts" in stream.needs)]
         found = Detections.join([*parts, stream.flush()])
         if not len(found):  # an empty table has the columns that a full one would have
             found = found.with_columns(**{name: () for name in COLUMNS if name in stream.ports})
-        facts: dict[str, Any] = {"chain": stream.chain, "notes": stream.notes}
+        found = found.annotated(notes=stream.notes)
         if candidates:
-            return found.annotated(candidates=_candidates(found, stream.rejected), **facts)
-        return found.annotated(candidates=lambda: self._audited(capture), **facts)
+            return found.annotated(candidates=_candidates(found, stream.rejected), chain=stream.chain)
+
+        @cache
+        def audited() -> Detections:
+            return self.run(capture, candidates=True)
+
+        return found.annotated(
+            candidates=lambda: _known(audited().candidates),
+            chain=(lambda: audited().chain) if stream.fused else stream.chain,
+        )
 
     def signals(self, capture: Capture) -> Iterator[Block]:
         """Blocks as the first stage that makes detections finds them: what it searches, for people to look at.
@@ -273,16 +194,12 @@ class Pipeline:
         Block
             Frames without clutter, ``first_path``, ``noise_rms`` and ``profile``, as far as the detector makes them.
         """
-        opened = self.open(capture)._stages
+        opened, _ = self._opened(capture)
         first = next(place for place, step in enumerate(opened) if "detections" in step.stage.produces)
         stream = Stream(opened[:first], [])
         for frames in capture.blocks(BATCH_FRAMES):
-            yield stream._through(Block(_without_invalid(frames)), 0)
-        yield from stream._tails()
-
-    def _audited(self, capture: Capture) -> Detections:
-        candidates = self.run(capture, candidates=True).candidates
-        return Detections.empty() if candidates is None else candidates
+            yield stream.through(Block(without_invalid(frames)))
+        yield from stream.tails()
 
     @property
     def identity(self) -> str:
@@ -306,6 +223,10 @@ def _makers_of(port: str) -> list[str]:
     return found
 
 
+def _known(candidates: Detections | None) -> Detections:
+    return Detections.empty() if candidates is None else candidates
+
+
 def _candidates(found: Detections, rejected: Detections) -> Detections:
     """Peaks before the filters, with ``retained`` 1 for those that passed them all, else ``rejected_by``."""
     kept = found.with_columns(retained=np.ones(len(found)), rejected_by=np.full(len(found), np.nan))
@@ -313,33 +234,39 @@ def _candidates(found: Detections, rejected: Detections) -> Detections:
     return Detections.join([kept, dropped])
 
 
-def _without_invalid(frames: Frames) -> Frames:
-    """Frames with the samples of invalid ones set to zero, so that no stage's state is poisoned by NaN."""
-    if frames.valid.all():
-        return frames
-    parts: dict[str, Any] = {}
-    for name in ("preamble", "sts1", "sts2"):
-        samples = getattr(frames, name)
-        if samples is not None:
-            parts[name] = np.where(frames.valid[:, None], samples, 0)
-    return Frames(**{**{k: v for k, v in vars(frames).items() if k != "amplitude"}, **parts})
+def _fused(steps: list[Opened], notes: list[str], threads: int) -> list[Opened]:
+    """Steps with kernels in place of the runs that they know."""
+    kernels: list[type[Kernel]] = []
+    for name in registry.entries("kernels"):
+        try:
+            kernels.append(registry.load("kernels", name))
+        except PluginError as error:  # the plain stages do the same
+            notes.append(f"not used: {error}")
+    fused: list[Opened] = []
+    place = 0
+    while place < len(steps):
+        stages = [step.stage for step in steps[place:]]
+        covered, kernel = max(
+            ((kind.covers(stages), kind) for kind in kernels), key=lambda found: found[0], default=(0, None)
+        )
+        if kernel is None or covered < 2 or _still_wanted(stages[:covered]) & _wanted(stages[covered:]):
+            fused.append(steps[place])
+            place += 1
+            continue
+        label = " + ".join(step.label for step in steps[place : place + covered])
+        fused.append(Opened(label, kernel(stages[:covered], threads, notes if place == 0 else ())))
+        place += covered
+    return fused
 
 
-def _without_rows_of_invalid(block: Block) -> Block:
-    """Block without detections of invalid frames, whatever a stage made of their zeros."""
-    frames, found = block.frames, block.detections
-    if frames.valid.all() or not len(found):
-        return block
-    return block.replace(detections=found.take(~np.isin(found.frame, frames.index[~frames.valid])))
+def _still_wanted(stages: list[Stage[Any]]) -> frozenset[str]:
+    """Ports about frames that these stages make, which a kernel keeps to itself."""
+    made = frozenset[str]().union(*(stage.produces for stage in stages))
+    return made & {"first_path", "noise", "profile"}
 
 
-def _brought_along(part: Block, block: Block) -> Block:
-    """Rejected detections with what a stage has just added about their frames.
-
-    Behind a stage that holds frames back the block covers other frames; the part then keeps its own.
-    """
-    same = part.frames.first == block.frames.first and len(part.frames) == len(block.frames)
-    return block.replace(detections=part.detections) if same else part
+def _wanted(stages: list[Stage[Any]]) -> frozenset[str]:
+    return frozenset[str]().union(*(stage.consumes for stage in stages))
 
 
 def load_detector(

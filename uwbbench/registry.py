@@ -1,6 +1,6 @@
 """Finding plugins by name, without importing any before one is asked for.
 
-Plugins are entry points of five groups: stages, datasets, metrics and terms are classes; a detector is a YAML file in a
+Plugins are entry points of six groups: stages, datasets, metrics, terms and kernels are classes; a detector is a YAML file in a
 package, named ``package.module:file.yaml``. Built-in plugins are registered in the same way.
 """
 
@@ -10,14 +10,15 @@ import importlib
 import importlib.util
 from dataclasses import dataclass
 from functools import cache
-from importlib.metadata import EntryPoint, entry_points
+from importlib.metadata import Distribution, entry_points
 from pathlib import Path
 from typing import Any, Literal
 
 from uwbbench.api.errors import PluginError, nearest
 
-Kind = Literal["stages", "datasets", "metrics", "terms", "detectors"]
+Kind = Literal["stages", "datasets", "metrics", "terms", "kernels", "detectors"]
 KINDS: tuple[Kind, ...] = ("stages", "detectors", "datasets", "metrics", "terms")
+"""Kinds whose names people write in files; kernels step in by themselves."""
 
 
 @dataclass(frozen=True)
@@ -41,8 +42,13 @@ class Entry:
     rivals: tuple[str, ...] = ()
 
 
-def _package(point: EntryPoint) -> str:
-    return f"{point.dist.name} {point.dist.version}" if point.dist else "unknown package"
+@cache
+def _package(distribution: Distribution | None) -> str:
+    """Name and version; read once for all that a distribution registers, as that takes longer than the rest."""
+    if distribution is None:
+        return "unknown package"
+    facts = distribution.metadata
+    return f"{facts['Name']} {facts['Version']}"
 
 
 @cache
@@ -50,7 +56,7 @@ def entries(kind: Kind) -> dict[str, Entry]:
     """All registered names of a kind, sorted; imports nothing."""
     found: dict[str, Entry] = {}
     for point in sorted(entry_points(group=f"uwbbench.{kind}"), key=lambda point: point.name):
-        mine = Entry(point.name, point.value, _package(point))
+        mine = Entry(point.name, point.value, _package(point.dist))
         other = found.get(point.name)
         if other is None:
             found[point.name] = mine
@@ -78,7 +84,7 @@ def entry(kind: Kind, name: str) -> Entry:
 
 
 @cache
-def load(kind: Literal["stages", "datasets", "metrics", "terms"], name: str) -> type[Any]:
+def load(kind: Literal["stages", "datasets", "metrics", "terms", "kernels"], name: str) -> type[Any]:
     """Class behind a name.
 
     Raises

@@ -95,18 +95,23 @@ class Azimuth(Stage[AzimuthParams]):
     def _spacing_m(self) -> float | None:
         return self.radar.array_spacing_m if self.params.spacing_m is None else self.params.spacing_m
 
-    def _angle(self, alpha_rad: FloatArray) -> FloatArray:
+    @property
+    def divisors(self) -> tuple[float, float] | None:
+        """What the phase difference is divided by to give the argument of the arcsine, and what the arcsine is.
+
+        None where the formula is a table.
+        """
         if self.params.formula == "paper":
-            return _arcsine(alpha_rad / np.pi) / PAPER_FACTOR
+            return np.pi, PAPER_FACTOR
         if self.params.formula == "paper_inside":
-            return _arcsine(alpha_rad / (PAPER_FACTOR * np.pi))
-        if self.params.formula == "physical":
-            spacing_m = self._spacing_m
-            assert spacing_m is not None  # noqa: S101  (open checks it)
-            return _arcsine(alpha_rad * self.radar.wavelength_m / (2 * np.pi * spacing_m))
+            return PAPER_FACTOR * np.pi, 1.0
+        if self._spacing_m is not None and self.params.formula == "physical":
+            return 2 * np.pi * self._spacing_m / self.radar.wavelength_m, 1.0
+        return None
+
+    def _angle(self, alpha_rad: FloatArray) -> FloatArray:
+        if self.divisors is not None:
+            largest, factor = self.divisors
+            return np.asarray(np.arcsin(np.clip(alpha_rad / largest, -1.0, 1.0)) / factor)
         pdoa_deg, azimuth_deg = np.array(self.params.table).T
         return np.asarray(np.deg2rad(np.interp(np.rad2deg(alpha_rad), pdoa_deg, azimuth_deg)))
-
-
-def _arcsine(ratio: FloatArray) -> FloatArray:
-    return np.asarray(np.arcsin(np.clip(ratio, -1.0, 1.0)))

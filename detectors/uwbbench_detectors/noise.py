@@ -94,35 +94,35 @@ class NoiseFloor(Stage[NoiseFloorParams]):
     def open(self, radar: Radar) -> None:
         """Settle method and window for this radar."""
         super().open(radar)
-        self._method = self.params.method
-        if self._method == "auto":
-            self._method = "leading" if radar.noise_taps else "median"
-            if self._method == "median":
+        self.method = self.params.method
+        if self.method == "auto":
+            self.method = "leading" if radar.noise_taps else "median"
+            if self.method == "median":
                 self.note("noise_floor: no taps before the first arrival, used the median magnitude of all taps")
-        self._taps = self.params.taps or radar.noise_taps
-        if self._method != "median":
-            if not self._taps:
+        self.taps = self.params.taps or radar.noise_taps
+        if self.method != "median":
+            if not self.taps:
                 raise ConfigError(
-                    f"noise_floor: method '{self._method}' needs 'taps', since this radar has no taps before the "
+                    f"noise_floor: method '{self.method}' needs 'taps', since this radar has no taps before the "
                     "first arrival (noise_taps is 0); or use method 'median'"
                 )
-            if self._taps > radar.taps:
-                raise ConfigError(f"noise_floor: taps is {self._taps}, but a frame has only {radar.taps} taps")
+            if self.taps > radar.taps:
+                raise ConfigError(f"noise_floor: taps is {self.taps}, but a frame has only {radar.taps} taps")
         self._past: FloatArray = np.empty(0)
         self._judged = self._suspicious = 0
 
     def step(self, block: Block) -> Block:
         """Block with ``noise_rms``; 0 for frames without a signal."""
         amplitude = block.frames.amplitude
-        if self._method == "median":
+        if self.method == "median":
             return block.replace(noise_rms=rayleigh_rms(amplitude))
-        tail = rms(amplitude[:, -self._taps :])
-        if self._method == "tail":
+        tail = rms(amplitude[:, -self.taps :])
+        if self.method == "tail":
             return block.replace(noise_rms=tail)
-        leading = rms(amplitude[:, : self._taps])
+        leading = rms(amplitude[:, : self.taps])
         measured = block.frames.valid & amplitude.any(axis=1)
         self._judge(leading[measured], tail[measured])
-        if self._method == "running_median":
+        if self.method == "running_median":
             steady = np.zeros(len(leading))
             steady[measured] = self._running_median(leading[measured])
             leading = steady
@@ -131,6 +131,13 @@ class NoiseFloor(Stage[NoiseFloorParams]):
     def flush(self) -> None:
         """Judge the leading taps of a capture too short to have been judged before."""
         if self._judged < FRAMES_TO_JUDGE:
+            self._conclude()
+
+    def tally(self, judged: int, suspicious: int) -> None:
+        """Take over the judgement of leading taps from elsewhere: frames judged so far, and suspicious ones of them."""
+        concludes = judged == FRAMES_TO_JUDGE and self._judged < judged
+        self._judged, self._suspicious = judged, suspicious
+        if concludes:
             self._conclude()
 
     def _running_median(self, level: FloatArray) -> FloatArray:
@@ -157,6 +164,6 @@ class NoiseFloor(Stage[NoiseFloorParams]):
     def _conclude(self) -> None:
         if 2 * self._suspicious > self._judged:
             self.note(
-                f"noise_floor: the first {self._taps} taps exceed {SUSPICIOUS_RATIO:g} times the noise of the last "
-                f"{self._taps} in most of the frames judged; they hold more than noise, and scores against them are low"
+                f"noise_floor: the first {self.taps} taps exceed {SUSPICIOUS_RATIO:g} times the noise of the last "
+                f"{self.taps} in most of the frames judged; they hold more than noise, and scores against them are low"
             )

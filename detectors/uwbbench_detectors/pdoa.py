@@ -86,13 +86,20 @@ class Pdoa(Stage[PdoaParams]):
         ):
             assert samples is not None  # noqa: S101  (the stage needs sts)
             at = tap
-            if self.params.sample != "same_tap":
-                if first_path is None or frames.first_path_index is None:
-                    self.note("pdoa: no first path is reported for each response, so STS is read at the preamble's tap")
-                else:
-                    at = first_path[rows] + (tap - frames.first_path_index[rows])
+            if first_path is not None and frames.first_path_index is not None and self.alignment(frames):
+                at = first_path[rows] + (tap - frames.first_path_index[rows])
             phases.append(self._phase(self._sampled(samples, rows, at)))
         return phases[1] - phases[0]
+
+    def alignment(self, frames: Frames) -> bool:
+        """Whether taps are counted from each response's own first path; a note says if they should be and cannot."""
+        if self.params.sample == "same_tap":
+            return False
+        paths = frames.first_path_index, frames.first_path_index_sts1, frames.first_path_index_sts2
+        if any(path is None for path in paths):
+            self.note("pdoa: no first path is reported for each response, so STS is read at the preamble's tap")
+            return False
+        return True
 
     def _sampled(self, samples: ComplexArray, rows: IntArray, at: FloatArray) -> ComplexArray:
         """Samples (n,) at fractional taps; NaN outside the window."""

@@ -47,11 +47,11 @@ class AmplitudeProfile(Stage[AmplitudeProfileParams]):
     def open(self, radar: Radar) -> None:
         """Settle the taps kept."""
         super().open(radar)
-        self._start = profile_start("profile.amplitude", self.params.skip_taps, radar)
+        self.start = profile_start("profile.amplitude", self.params.skip_taps, radar)
 
     def step(self, block: Block) -> Block:
         """Block with the profile."""
-        return block.replace(profile=block.frames.amplitude[:, self._start :], profile_start=self._start)
+        return block.replace(profile=block.frames.amplitude[:, self.start :], profile_start=self.start)
 
 
 class MinMaxProfileParams(AmplitudeProfileParams):
@@ -85,7 +85,7 @@ class MinMaxProfile(Stage[MinMaxProfileParams]):
     def open(self, radar: Radar) -> None:
         """Settle the taps kept."""
         super().open(radar)
-        self._start = profile_start("profile.minmax", self.params.skip_taps, radar)
+        self.start = profile_start("profile.minmax", self.params.skip_taps, radar)
         self._held: list[Block] = []
 
     def step(self, block: Block) -> Block:
@@ -94,7 +94,7 @@ class MinMaxProfile(Stage[MinMaxProfileParams]):
             self._held.append(block)
             return self._scaled(_emptied(block), np.zeros(0), np.zeros(0))
         amplitude = block.frames.amplitude
-        ruling = amplitude if self.params.scope == "frame_all_taps" else amplitude[:, self._start :]
+        ruling = amplitude if self.params.scope == "frame_all_taps" else amplitude[:, self.start :]
         return self._scaled(block, ruling.min(axis=1), ruling.max(axis=1))
 
     def flush(self) -> Block | None:
@@ -103,7 +103,7 @@ class MinMaxProfile(Stage[MinMaxProfileParams]):
             return None
         block = Block.join(self._held)
         self._held = []
-        ruling = block.frames.amplitude[block.frames.valid, self._start :]
+        ruling = block.frames.amplitude[block.frames.valid, self.start :]
         lowest, highest = (ruling.min(), ruling.max()) if ruling.size else (0.0, 0.0)
         frames = len(block.frames)
         return self._scaled(block, np.full(frames, lowest), np.full(frames, highest))
@@ -113,10 +113,10 @@ class MinMaxProfile(Stage[MinMaxProfileParams]):
         span = highest - lowest
         # A ripple of a few units in the last place on a constant frame must not become a full-scale peak.
         varies = block.frames.valid & (span > 8 * np.finfo(float).eps * highest)
-        kept = block.frames.amplitude[:, self._start :]
+        kept = block.frames.amplitude[:, self.start :]
         profile = np.zeros(kept.shape)
         profile[varies] = (kept[varies] - lowest[varies, None]) / span[varies, None]
-        return block.replace(profile=profile, profile_start=self._start)
+        return block.replace(profile=profile, profile_start=self.start)
 
 
 def _emptied(block: Block) -> Block:

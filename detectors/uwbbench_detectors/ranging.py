@@ -69,14 +69,18 @@ class Range(Stage[RangeParams]):
                     "give a number in metres"
                 )
             bias = PAPER_BIAS_M[radar.channel]
-        self._bias_m = bias
+        self.bias_m = bias
+
+    @property
+    def speed_ratio(self) -> float:
+        """Speed that is assumed, over the speed of light."""
+        return 1.0 if self.params.speed_of_light == "exact" else ROUNDED_SPEED_M_S / SPEED_OF_LIGHT_M_S
 
     def step(self, block: Block) -> Block:
         """Block whose detections carry ``delay_s`` and ``range_m``."""
         radar = self.radar
         delay_s = (block.detections["tap"] - block.part("first_path")[block.rows]) * radar.sample_interval_s
-        speed_m_s = SPEED_OF_LIGHT_M_S if self.params.speed_of_light == "exact" else ROUNDED_SPEED_M_S
-        flown_s = delay_s * (speed_m_s / SPEED_OF_LIGHT_M_S)
+        flown_s = delay_s * self.speed_ratio
         if self.params.includes_baseline:
             excess_m = radar.excess_m(flown_s)
         else:
@@ -86,7 +90,7 @@ class Range(Stage[RangeParams]):
             range_m = bistatic_range(excess_m, direction(azimuth_rad), radar.baseline_m)
         else:
             range_m = bistatic_range_sine(excess_m, azimuth_rad, radar.baseline_length_m)
-        return block.with_columns(delay_s=delay_s, range_m=range_m - self._bias_m)
+        return block.with_columns(delay_s=delay_s, range_m=range_m - self.bias_m)
 
 
 class PositionParams(Params):

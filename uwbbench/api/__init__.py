@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     )
     from uwbbench.api.frames import Frames, magnitude
     from uwbbench.api.geometry import SPEED_OF_LIGHT_M_S
+    from uwbbench.api.kernel import Kernel
     from uwbbench.api.metric import Metric, Outcome
     from uwbbench.api.radar import Radar
     from uwbbench.api.stage import Filter, Params, Stage, ports
@@ -53,6 +54,7 @@ _HOME = {
     ),
     "frames": ("Frames", "magnitude"),
     "geometry": ("SPEED_OF_LIGHT_M_S",),
+    "kernel": ("Kernel",),
     "metric": ("Metric", "Outcome"),
     "radar": ("Radar",),
     "stage": ("Filter", "Params", "Stage", "ports"),
@@ -80,6 +82,7 @@ __all__ = [
     "FloatArray",
     "Frames",
     "IntArray",
+    "Kernel",
     "Metric",
     "Obstacle",
     "Outcome",

@@ -32,6 +32,9 @@ COLUMNS = (
 
 _INTEGER = ("frame", "cluster")
 
+_Table = tuple[Sequence[str], FloatArray]
+"""Names of columns, and the frames and these columns as one array."""
+
 
 class Detections:
     """Detections as a struct of arrays.
@@ -49,8 +52,8 @@ class Detections:
         What a reader of the results must know, for example stages left out.
     candidates : Detections or callable, optional
         Every peak before the filters, or a function that finds them when somebody asks.
-    chain : mapping, optional
-        Detections left behind each step of the pipeline, in order.
+    chain : mapping or callable, optional
+        Detections left behind each step of the pipeline, in order, or a function that counts them.
     **columns : (n,) arrays
         Any of :data:`COLUMNS`, and columns of a plugin's own.
     """
@@ -62,20 +65,81 @@ class Detections:
         processed: ArrayLike | None = None,
         notes: Sequence[str] = (),
         candidates: Detections | Callable[[], Detections] | None = None,
-        chain: Mapping[str, int] | None = None,
+        chain: Mapping[str, int] | Callable[[], Mapping[str, int]] | None = None,
         **columns: ArrayLike,
     ) -> None:
-        self.columns: dict[str, NDArray[Any]] = {"frame": np.asarray(frame, dtype=np.int64)}
+        given: dict[str, NDArray[Any]] = {"frame": np.asarray(frame, dtype=np.int64)}
         for name, values in columns.items():
-            self.columns[name] = np.asarray(values, dtype=np.int64 if name in _INTEGER else np.float64)
-        lengths = {name: len(values) for name, values in self.columns.items()}
-        if len(set(lengths.values())) > 1:
+            given[name] = np.asarray(values, dtype=np.int64 if name in _INTEGER else np.float64)
+        if len({len(values) for values in given.values()}) > 1:
+            lengths = {name: len(values) for name, values in given.items()}
             raise ValueError(f"detection columns differ in length: {lengths}")
-        seen = np.unique(self.frame) if processed is None else np.asarray(processed, dtype=np.int64)
-        self.processed: IntArray = seen
-        self.notes: tuple[str, ...] = tuple(notes)
-        self.chain: dict[str, int] = dict(chain or {})
+        self._columns: dict[str, NDArray[Any]] | _Table = given
+        self._processed: IntArray | tuple[int, BoolArray] = (
+            given["frame"] if processed is None else np.asarray(processed, dtype=np.int64)
+        )
+        self._unsorted = processed is None
+        self._notes: Sequence[str] = notes
         self._candidates = candidates
+        self._chain = chain
+
+    @classmethod
+    def of_table(
+        cls,
+        names: Sequence[str],
+        table: FloatArray,
+        processed: tuple[int, BoolArray],
+        notes: Sequence[str],
+    ) -> Detections:
+        """Detections from a table made by compiled code, at hardly any cost until somebody looks at them.
+
+        Parameters
+        ----------
+        names : sequence of str
+            Columns behind the frame, none of them of whole numbers.
+        table : (n, 1 + columns) array
+            The first column holds the bits of whole numbers, the frames.
+        processed : int and (frames,) bool array
+            First frame of the block, and which of its frames were looked at.
+        notes : sequence of str
+        """
+        made = object.__new__(cls)
+        made._columns = (names, table)
+        made._processed = processed
+        made._unsorted = False
+        made._notes = notes
+        made._candidates = made._chain = None
+        return made
+
+    @property
+    def columns(self) -> dict[str, NDArray[Any]]:
+        """All columns by name, ``frame`` first."""
+        if isinstance(self._columns, tuple):
+            names, table = self._columns
+            self._columns = {"frame": self.frame, **dict(zip(names, table.T[1:], strict=True))}
+        return self._columns
+
+    @property
+    def processed(self) -> IntArray:
+        """Indices of all frames that a detector has looked at (m,)."""
+        if isinstance(self._processed, tuple):
+            first, looked_at = self._processed
+            self._processed = first + np.flatnonzero(looked_at)
+        if self._unsorted:
+            self._processed, self._unsorted = np.unique(self._processed), False
+        return self._processed
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What a reader of the results must know."""
+        return tuple(self._notes)
+
+    @property
+    def chain(self) -> dict[str, int]:
+        """Detections left behind each step of the pipeline, in order; counted on demand."""
+        if callable(self._chain):
+            self._chain = self._chain()
+        return dict(self._chain or {})
 
     @classmethod
     def empty(cls, processed: ArrayLike = (), notes: Sequence[str] = ()) -> Detections:
@@ -83,7 +147,7 @@ class Detections:
         return cls(np.empty(0, np.int64), processed=processed, notes=notes)
 
     def __len__(self) -> int:
-        return len(self.frame)
+        return len(self._columns[1] if isinstance(self._columns, tuple) else self._columns["frame"])
 
     def __repr__(self) -> str:
         return f"Detections({len(self)} in {len(self.processed)} frames: {', '.join(self.columns)})"
@@ -99,7 +163,9 @@ class Detections:
     @property
     def frame(self) -> IntArray:
         """Frame index of each detection (n,)."""
-        return self.columns["frame"]
+        if isinstance(self._columns, tuple):
+            return self._columns[1].view(np.int64)[:, 0]
+        return self._columns["frame"]
 
     @property
     def range_m(self) -> FloatArray:
@@ -120,7 +186,14 @@ class Detections:
 
     def with_columns(self, **columns: ArrayLike) -> Detections:
         """Return the same detections with columns added or replaced."""
-        return self._with({**self.columns, **columns})
+        added = {
+            name: np.asarray(values, dtype=np.int64 if name in _INTEGER else np.float64)
+            for name, values in columns.items()
+        }
+        wrong = {name: len(values) for name, values in added.items() if len(values) != len(self)}
+        if wrong:
+            raise ValueError(f"detection columns differ in length: {len(self)} rows, but {wrong}")
+        return self._with({**self.columns, **added})
 
     def take(self, rows: BoolArray | IntArray) -> Detections:
         """Return the rows of a mask or an index array; the processed frames stay."""
@@ -129,26 +202,33 @@ class Detections:
     def annotated(
         self,
         *,
-        processed: ArrayLike | None = None,
+        processed: IntArray | tuple[int, BoolArray] | None = None,
         notes: Sequence[str] | None = None,
         candidates: Detections | Callable[[], Detections] | None = None,
-        chain: Mapping[str, int] | None = None,
+        chain: Mapping[str, int] | Callable[[], Mapping[str, int]] | None = None,
     ) -> Detections:
-        """Return the same rows with other facts about them; what is not given stays."""
-        facts: dict[str, Any] = self.columns
-        return Detections(
-            **facts,
-            processed=self.processed if processed is None else processed,
-            notes=self.notes if notes is None else notes,
-            candidates=self._candidates if candidates is None else candidates,
-            chain=self.chain if chain is None else chain,
-        )
+        """Return the same rows with other facts about them; what is not given stays.
 
-    def _with(self, columns: Mapping[str, ArrayLike]) -> Detections:
-        facts: dict[str, Any] = dict(columns)
-        return Detections(
-            **facts, processed=self.processed, notes=self.notes, candidates=self._candidates, chain=self.chain
-        )
+        ``processed`` may be the first frame of a block and a mask of its frames.
+        """
+        made = self._with(self._columns)
+        if processed is not None:
+            made._processed, made._unsorted = processed, False
+        if notes is not None:
+            made._notes = notes
+        if candidates is not None:
+            made._candidates = candidates
+        if chain is not None:
+            made._chain = chain
+        return made
+
+    def _with(self, columns: dict[str, NDArray[Any]] | _Table) -> Detections:
+        """Detections of checked columns with the same facts about them."""
+        made = object.__new__(Detections)
+        made._columns = columns
+        made._processed, made._unsorted = self._processed, self._unsorted
+        made._notes, made._candidates, made._chain = self._notes, self._candidates, self._chain
+        return made
 
     @staticmethod
     def join(parts: Sequence[Detections]) -> Detections:
