@@ -86,7 +86,7 @@ class Pdoa(Stage[PdoaParams]):
         ):
             assert samples is not None  # noqa: S101  (the stage needs sts)
             at = tap
-            if first_path is not None and frames.first_path_index is not None and self.alignment(frames):
+            if self.alignment(frames) and first_path is not None and frames.first_path_index is not None:
                 at = first_path[rows] + (tap - frames.first_path_index[rows])
             phases.append(self._phase(self._sampled(samples, rows, at)))
         return phases[1] - phases[0]
