@@ -50,7 +50,9 @@ def azimuth_of(pdoa_rad: float, limits: FloatArray) -> float:
 @compiled
 def range_of(delay_s: float, azimuth_rad: float, how: IntArray, limits: FloatArray) -> float:
     """Bistatic range, as uwbbench.api.geometry has it; boresight where the azimuth is not known."""
-    azimuth = 0.0 if math.isnan(azimuth_rad) else azimuth_rad
+    cosine, sine = 1.0, 0.0
+    if not math.isnan(azimuth_rad):
+        cosine, sine = math.cos(azimuth_rad), math.sin(azimuth_rad)
     excess = (delay_s * limits[at.SPEED_RATIO]) * SPEED_OF_LIGHT_M_S - limits[at.EXCESS_OFFSET_M]
     length = limits[at.BASELINE_LENGTH]
     if excess == 0:
@@ -58,10 +60,10 @@ def range_of(delay_s: float, azimuth_rad: float, how: IntArray, limits: FloatArr
     if not excess > 0:
         return float(np.nan)
     if how[at.RANGED] == at.RANGED_EXACT:
-        ahead = math.cos(azimuth) * limits[at.BASELINE_X] + math.sin(azimuth) * limits[at.BASELINE_Y]
+        ahead = cosine * limits[at.BASELINE_X] + sine * limits[at.BASELINE_Y]
         path = excess + (length - ahead)
     else:
-        path = excess + length * (1 + math.sin(azimuth))
+        path = excess + length * (1 + sine)
     return float(excess * (excess + 2 * length) / (2 * path) - limits[at.RANGE_BIAS])
 
 

@@ -9,7 +9,7 @@ grows with the taps alone.
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -27,7 +27,7 @@ from uwbbench_detectors.fused.frame import (
     vertex_shift,
 )
 from uwbbench_detectors.fused.place import azimuth_of, phase_difference, position_of, range_of
-from uwbbench_detectors.fused.shape import measure_prominences, prominence_of, width_of
+from uwbbench_detectors.fused.shape import prominence_of, prominences_of, width_of
 
 TRIED_SINGLY = 4
 """Peaks examined by falling amplitude before all are described."""
@@ -36,7 +36,21 @@ NEAR = 1e-9
 """A decision that hangs on a logarithm or an angle closer to its limit than this is left to the plain stages."""
 
 PASSED, FAILED, UNDECIDED = 0, 1, 2
-UNCLEAR = -1
+UNCLEAR, MORE = -1, -2
+
+
+class Signal(NamedTuple):
+    """What the search knows of one frame, in numbers; arrays are handed on by themselves, which costs less."""
+
+    row: int
+    count: int
+    guarded: int
+    first_path: float
+    noise: float
+    noise_log: float
+    path: float
+    path1: float
+    path2: float
 
 
 @compiled
@@ -88,18 +102,15 @@ def _guarded(peaks: IntArray, count: int, earliest: float, near: float) -> int:
 def _examine(
     amplitude: FloatArray,
     profile: FloatArray,
-    place: int,
-    first_path: float,
-    noise_log: float,
     responses1: Any,
     responses2: Any,
-    frame: int,
-    paths: tuple[float, float, float],
     how: IntArray,
     limits: FloatArray,
+    signal: Signal,
+    place: int,
     row: FloatArray,
 ) -> int:
-    """Whether a peak passes the filters; ``row`` (columns,) takes its properties.
+    """Whether the peak at a place of the profile passes the filters; ``row`` (columns,) takes its properties.
 
     ``row`` holds its prominence already, or NaN where that is not known.
     """
@@ -113,8 +124,8 @@ def _examine(
     tap = place + how[at.PROFILE_START]
     row[at.TAP], row[at.AMPLITUDE] = tap, amplitude[tap]
     if how[at.SCORED]:
-        delay = (tap - first_path) * limits[at.DELAY_UNIT]
-        row[at.SCORE] = 20 * (math.log10(amplitude[tap]) - noise_log) + limits[at.GAIN_DB] * delay
+        delay = (tap - signal.first_path) * limits[at.DELAY_UNIT]
+        row[at.SCORE] = 20 * (math.log10(amplitude[tap]) - signal.noise_log) + limits[at.GAIN_DB] * delay
         if abs(row[at.SCORE] - limits[at.LEAST_SCORE]) < NEAR:
             return UNDECIDED
         if not row[at.SCORE] >= limits[at.LEAST_SCORE]:
@@ -122,8 +133,9 @@ def _examine(
     if how[at.PHASED]:
         taps = (float(tap), float(tap))
         if how[at.ALIGNED]:
-            taps = (paths[1] + (tap - paths[0]), paths[2] + (tap - paths[0]))
-        row[at.PDOA] = phase_difference(responses1, responses2, frame, taps, how[at.WRAPPED_ABOVE] == 1)
+            taps = (signal.path1 + (tap - signal.path), signal.path2 + (tap - signal.path))
+        above = how[at.WRAPPED_ABOVE] == 1
+        row[at.PDOA] = phase_difference(responses1, responses2, signal.row, taps, above)
         size, largest = abs(row[at.PDOA]), limits[at.LARGEST_PDOA]
         if math.pi - size < NEAR or abs(size - largest) < NEAR:
             return UNDECIDED
@@ -133,20 +145,81 @@ def _examine(
 
 
 @compiled
-def _strongest_below(amplitude: FloatArray, peaks: IntArray, guarded: int, count: int, start: int, bound: int) -> int:
+def _strongest_below(amplitude: FloatArray, peaks: IntArray, start: int, signal: Signal, bound: int) -> int:
     """Place of the strongest peak weaker than that at ``bound``, or as strong and later; -1 for none."""
     best = -1
     height = -1.0
-    for number in range(guarded, count):
+    limit = np.inf if bound < 0 else amplitude[bound + start]
+    for number in range(signal.guarded, signal.count):  # without a branch: which is strongest cannot be foretold
         place = peaks[number]
         strength = amplitude[place + start]
-        if bound >= 0 and not (
-            strength < amplitude[bound + start] or (strength == amplitude[bound + start] and place > bound)
-        ):
-            continue
-        if strength > height:
-            best, height = place, strength
+        better = (strength > height) & ((strength < limit) | ((strength == limit) & (place > bound)))
+        best, height = (place if better else best), (strength if better else height)
     return best
+
+
+@compiled
+def _examine_by_strength(
+    amplitude: FloatArray,
+    profile: FloatArray,
+    responses1: Any,
+    responses2: Any,
+    how: IntArray,
+    limits: FloatArray,
+    signal: Signal,
+    peaks: IntArray,
+    passed: FloatArray,
+) -> int:
+    """Keep the strongest peak that passes: how many do, UNCLEAR where rounding could decide, or MORE after many."""
+    start = how[at.PROFILE_START]
+    row = passed[0]
+    weakest = signal.noise * limits[at.LEAST_RATIO]
+    best = -1
+    for _ in range(TRIED_SINGLY):
+        best = _strongest_below(amplitude, peaks, start, signal, best)
+        # No peak is more prominent than it is high, and those left are no higher.
+        if best < 0 or not profile[best] >= limits[at.LEAST_PROMINENCE]:
+            return 0
+        if amplitude[best + start] < weakest:
+            return 0
+        row[at.PROMINENCE] = np.nan
+        verdict = _examine(amplitude, profile, responses1, responses2, how, limits, signal, best, row)
+        if verdict != FAILED:
+            return 1 if verdict == PASSED else UNCLEAR
+    return MORE
+
+
+@compiled
+def _examine_all(
+    amplitude: FloatArray,
+    profile: FloatArray,
+    responses1: Any,
+    responses2: Any,
+    how: IntArray,
+    limits: FloatArray,
+    signal: Signal,
+    peaks: IntArray,
+    passed: FloatArray,
+    single: bool,
+) -> int:
+    """Keep the peaks that pass, by rising tap, or the strongest: how many, or UNCLEAR where rounding could decide."""
+    start = how[at.PROFILE_START]
+    prominence = prominences_of(profile, peaks[: signal.count])
+    kept = 0
+    for number in range(signal.guarded, signal.count):
+        place = peaks[number]
+        if single and kept and not amplitude[place + start] > passed[0, at.AMPLITUDE]:
+            continue
+        passed[kept, at.PROMINENCE] = prominence[number]
+        verdict = _examine(amplitude, profile, responses1, responses2, how, limits, signal, place, passed[kept])
+        if verdict == UNDECIDED:
+            return UNCLEAR
+        if verdict == PASSED:
+            if single and kept:
+                passed[0] = passed[1]
+            else:
+                kept += 1
+    return kept
 
 
 @compiled
@@ -241,15 +314,15 @@ def search(
     int
         Detections found; -1 less that if frames are irregular.
     """
-    taps, start = samples.shape[1], how[at.PROFILE_START]
+    start = how[at.PROFILE_START]
     single = how[at.SELECT] == at.SELECT_STRONGEST and how[at.COUNT] == 1
     near = NEAR if how[at.FIRST_PATH] == at.FIRST_PATH_INTERPOLATED else 0.0
-    amplitude, scaled, ends = np.empty(taps), np.empty(taps - start), np.empty(2)
+    taps = samples.shape[1]
+    amplitude, ends = np.empty(taps), np.empty(2)
+    profile = amplitude[start:] if how[at.PROFILE] == at.PROFILE_AMPLITUDE else np.empty(taps - start)
     marked, peaks = np.empty(taps, np.uint8), np.empty(taps, np.int64)
-    higher, lowest, prominence = np.empty(taps, np.int64), np.empty(taps), np.empty(taps)
     passed = np.empty((2 if single else taps // 2 + 1, len(at.COLUMNS)))
     retained = np.empty(len(passed), np.uint8)
-    profile = amplitude[start:] if how[at.PROFILE] == at.PROFILE_AMPLITUDE else scaled
     frame = table.view(np.int64)
     clear = True
     found = 0
@@ -258,89 +331,38 @@ def search(
         if not valid[row]:
             continue
         measure_magnitudes(samples, row, amplitude)
-        find_extremes(amplitude, 0, ends)
+        find_extremes(amplitude, 0 if how[at.PROFILE] == at.PROFILE_MINMAX_ALL_TAPS else start, ends)
         highest = ends[1]
+        for tap in range(start):
+            highest = max(highest, amplitude[tap])
         regular = highest < np.inf
         if how[at.NOISE] == at.NOISE_LEADING and told[at.JUDGED] < at.FRAMES_JUDGED and regular and highest > 0:
             _judge(amplitude, how, told)
-        if how[at.PROFILE] != at.PROFILE_AMPLITUDE:
-            if how[at.PROFILE] == at.PROFILE_MINMAX:
-                find_extremes(amplitude, start, ends)
-            if regular and not scale_profile(amplitude, start, ends[0], ends[1], scaled):
-                continue
+        scaled = how[at.PROFILE] != at.PROFILE_AMPLITUDE
+        if scaled and regular and not scale_profile(amplitude, start, ends[0], ends[1], profile):
+            continue
         first_path, close = _first_path(amplitude, given, row, how, limits)
         regular = regular and not close and math.isfinite(first_path)
-        count = guarded = 0
-        if regular:
-            count = find_maxima(profile, marked, peaks)
-            guarded = _guarded(peaks, count, first_path + limits[at.GUARD_TAPS] - start, near)
-            if guarded == count:
-                continue
-            regular = guarded != UNCLEAR
-        noise = _noise(amplitude, how) if regular and how[at.SCORED] else 1.0
-        kept = 0
-        if regular and noise > 0:
-            noise_log = math.log10(noise)
-            weakest = noise * limits[at.LEAST_RATIO]
+        count = find_maxima(profile, marked, peaks) if regular else 0
+        guarded = _guarded(peaks, count, first_path + limits[at.GUARD_TAPS] - start, near)
+        if regular and guarded == count:
+            continue
+        noise = _noise(amplitude, how) if how[at.SCORED] else 1.0
+        kept = UNCLEAR
+        if regular and guarded != UNCLEAR and noise > 0:
             paths = (path[row], path1[row], path2[row]) if how[at.ALIGNED] else (0.0, 0.0, 0.0)
-            best = -1
-            tried = 0
-            while single and tried < TRIED_SINGLY and kept == 0:
-                best = _strongest_below(amplitude, peaks, guarded, count, start, best)
-                # No peak is more prominent than it is high, and those left are no higher.
-                if best < 0 or not profile[best] >= limits[at.LEAST_PROMINENCE] or amplitude[best + start] < weakest:
-                    break
-                passed[0, at.PROMINENCE] = np.nan
-                verdict = _examine(
-                    amplitude,
-                    profile,
-                    best,
-                    first_path,
-                    noise_log,
-                    responses1,
-                    responses2,
-                    row,
-                    paths,
-                    how,
-                    limits,
-                    passed[0],
+            signal = Signal(row, count, guarded, first_path, noise, math.log10(noise), paths[0], paths[1], paths[2])
+            kept = (
+                _examine_by_strength(amplitude, profile, responses1, responses2, how, limits, signal, peaks, passed)
+                if single
+                else MORE
+            )
+            if kept == MORE:
+                kept = _examine_all(
+                    amplitude, profile, responses1, responses2, how, limits, signal, peaks, passed, single
                 )
-                kept = 1 if verdict == PASSED else UNCLEAR if verdict == UNDECIDED else 0
-                tried += 1
-            if not single or (tried == TRIED_SINGLY and kept == 0):
-                measure_prominences(profile, peaks, count, higher, lowest, prominence)
-                for number in range(guarded, count):
-                    place = peaks[number]
-                    if single and kept and not amplitude[place + start] > passed[0, at.AMPLITUDE]:
-                        continue
-                    passed[kept, at.PROMINENCE] = prominence[number]
-                    verdict = _examine(
-                        amplitude,
-                        profile,
-                        place,
-                        first_path,
-                        noise_log,
-                        responses1,
-                        responses2,
-                        row,
-                        paths,
-                        how,
-                        limits,
-                        passed[kept],
-                    )
-                    if verdict == UNDECIDED:
-                        kept = UNCLEAR
-                        break
-                    if verdict == PASSED:
-                        if single and kept:
-                            passed[0] = passed[1]
-                        else:
-                            kept += 1
-        else:
-            kept = UNCLEAR
         if kept == UNCLEAR:
-            irregular[row] = True
-            clear = False
+            irregular[row], clear = True, False
             continue
         _retain(passed, kept, how, retained)
         for number in range(kept):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from uwbbench.api.arrays import FloatArray, IntArray
 from uwbbench.api.compiled import compiled
 
@@ -28,17 +30,16 @@ def prominence_of(profile: FloatArray, tap: int, least: float) -> float:
 
 
 @compiled
-def measure_prominences(
-    profile: FloatArray, peaks: IntArray, count: int, higher: IntArray, lowest: FloatArray, prominence: FloatArray
-) -> None:
-    """Write the prominences of all peaks (count,) in one pass to each side.
+def prominences_of(profile: FloatArray, peaks: IntArray) -> FloatArray:
+    """Prominences of all peaks (count,), found in one pass to each side.
 
     A stack holds the peaks that are higher than all between them and the present one. What a peak would have to look
     over, the peaks it takes off the stack have looked over before: the work grows with the taps, however many peaks
     there are, where looking from each peak anew grows with their square on a comb.
-
-    ``higher`` and ``lowest`` are room for the stack (count,).
     """
+    count = len(peaks)
+    prominence = np.empty(count)
+    higher, lowest = np.empty(count, np.int64), np.empty(count)
     depth = 0
     for place in range(count):
         tap = peaks[place]
@@ -63,6 +64,7 @@ def measure_prominences(
         higher[depth], lowest[depth] = place, base
         depth += 1
         prominence[place] = profile[tap] - max(prominence[place], base)
+    return prominence
 
 
 @compiled

@@ -62,7 +62,7 @@ def captured(samples, sts=None, paths=None, **facts) -> Capture:
 
 
 def responses(seed: int, kind: str, frames: int = 12, dtype=np.complex64):
-    """Frames (frames, taps) in which decisions are hard: ties, flat tops, ripples, zeros, huge spans, missing values."""
+    """Frames (frames, taps) in which decisions are hard: ties, flat tops, ripples, zeros, huge spans, gaps."""
     rng = np.random.default_rng(seed)
     shape = (frames, TAPS)
     if kind == "integers":
@@ -88,15 +88,18 @@ def responses(seed: int, kind: str, frames: int = 12, dtype=np.complex64):
 @st.composite
 def chains(draw) -> str:
     """A detector of stages that the search knows, in any of the arrangements it takes."""
-    profile = draw(
-        st.sampled_from(
-            ["profile.minmax", "profile.minmax, params: {scope: frame_all_taps}", "profile.amplitude"]
-            + ["profile.minmax, params: {skip_taps: 0}"]
-        )
-    )
+    minmax = [
+        "profile.minmax" + params for params in ("", ", params: {scope: frame_all_taps}", ", params: {skip_taps: 0}")
+    ]
+    profile = draw(st.sampled_from([*minmax, "profile.amplitude"]))
     noise = draw(
         st.sampled_from(
-            ["", ", params: {method: median}", ", params: {method: tail, taps: 9}", ", params: {method: leading, taps: 17}"]
+            [
+                "",
+                ", params: {method: median}",
+                ", params: {method: tail, taps: 9}",
+                ", params: {method: leading, taps: 17}",
+            ]
         )
     )
     crest = draw(st.booleans())
@@ -110,7 +113,9 @@ def chains(draw) -> str:
     steps += [one for one in filters if draw(st.booleans())]
     if draw(st.booleans()):
         steps.append(f"score.snr, params: {{gain_db_per_ns: {draw(st.sampled_from([0.0, 0.2, -0.1]))}}}")
-        steps += [f"filter.snr, params: {{minimum_db: {draw(st.sampled_from([-5.0, 6.0, 12.0]))}}}"] * draw(st.booleans())
+        steps += [f"filter.snr, params: {{minimum_db: {draw(st.sampled_from([-5.0, 6.0, 12.0]))}}}"] * draw(
+            st.booleans()
+        )
     if draw(st.booleans()):
         sample = draw(st.sampled_from(["aligned", "same_tap"]))
         wrap = draw(st.sampled_from(["half_open", "closed_above"]))
@@ -290,4 +295,3 @@ def test_a_kernel_that_cannot_be_loaded_is_named_and_the_stages_do_the_work(inst
     found = load_detector("paper-filtering").run(capture)
     assert any("kernel 'broken' of broken 1.0 cannot be loaded" in note for note in found.notes)
     np.testing.assert_array_equal(found["range_m"], usual["range_m"])
-

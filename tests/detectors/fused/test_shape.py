@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 from scipy import signal
 
 from uwbbench_detectors.fused.frame import find_maxima, root_mean_square
-from uwbbench_detectors.fused.shape import measure_prominences, prominence_of, width_of
+from uwbbench_detectors.fused.shape import prominence_of, prominences_of, width_of
 from uwbbench_detectors.noise import rms
 
 heights = st.lists(st.integers(0, 6) | st.floats(0, 10, width=32), min_size=3, max_size=80)
@@ -28,10 +28,7 @@ def test_maxima_prominences_and_widths_are_those_of_scipy(values):
         return
     bases = signal.peak_prominences(profile, peaks)
     widths, *_ = signal.peak_widths(profile, peaks, 0.5, prominence_data=bases)
-    count = len(peaks)
-    found = np.empty(count)
-    measure_prominences(profile, peaks, count, np.empty(count, np.int64), np.empty(count), found)
-    np.testing.assert_array_equal(found, bases[0])
+    np.testing.assert_array_equal(prominences_of(profile, peaks), bases[0])
     for peak, prominence, width in zip(peaks, bases[0], widths, strict=True):
         assert prominence_of(profile, peak, 0.0) == prominence
         np.testing.assert_allclose(width_of(profile, peak, prominence, 0.5), width, rtol=0, atol=1e-12)
@@ -40,9 +37,7 @@ def test_maxima_prominences_and_widths_are_those_of_scipy(values):
 def test_a_comb_has_the_prominences_of_scipy():
     profile = np.where(np.arange(2001) % 2, 1 + np.arange(2001) / 4e3, 0.1)
     peaks, _ = signal.find_peaks(profile)
-    found = np.empty(len(peaks))
-    measure_prominences(profile, peaks, len(peaks), np.empty(len(peaks), np.int64), np.empty(len(peaks)), found)
-    np.testing.assert_array_equal(found, signal.peak_prominences(profile, peaks)[0])
+    np.testing.assert_array_equal(prominences_of(profile, peaks), signal.peak_prominences(profile, peaks)[0])
 
 
 @given(st.lists(st.floats(0, 1e300), min_size=1, max_size=128))
