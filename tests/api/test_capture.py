@@ -33,6 +33,50 @@ def test_a_frame_with_a_sample_that_is_not_finite_is_marked_invalid(where, bad):
     assert frames.valid.tolist() == [True, True, False, True, True]
 
 
+def test_without_sts_validity_judges_the_preamble_alone():
+    parts = {name: noise(5, 8) for name in ("preamble", "sts1", "sts2")}
+    parts["preamble"][1, 0] = parts["sts1"][3, 0] = np.nan
+    frames = capture_of(**parts).frames(sts=False)
+    assert (frames.sts1, frames.sts2) == (None, None)
+    assert frames.valid.tolist() == [True, False, True, True, True]
+
+
+def test_blocks_without_sts_leave_it_unread():
+    class Unread:
+        shape = (5, 8)
+
+        def __getitem__(self, key, /):
+            raise AssertionError("read")
+
+    capture = capture_of(noise(5, 8), sts1=Unread(), sts2=Unread())
+    assert [frames.sts1 for frames in capture.blocks(2, sts=False)] == [None, None, None]
+    with pytest.raises(AssertionError, match="read"):
+        next(capture.blocks(2))
+
+
+@settings(max_examples=50, deadline=None)
+@given(st.data())
+def test_the_validity_marks_are_those_of_isfinite(data):
+    samples = noise(6, 7).astype(data.draw(st.sampled_from([np.complex64, np.complex128])))
+    for _ in range(data.draw(st.integers(0, 3))):
+        row, tap = data.draw(st.integers(0, 5)), data.draw(st.integers(0, 6))
+        samples[row, tap] = data.draw(st.sampled_from([np.nan, np.inf, complex(0, -np.inf), 3e38, 0]))
+    frames = capture_of(samples).frames()
+    np.testing.assert_array_equal(frames.valid, np.isfinite(samples).all(axis=1))
+
+
+@pytest.mark.parametrize("samples", [noise(12, 8)[::2], noise(8, 12).T, noise(6, 16)[:, ::2]])
+def test_samples_of_any_layout_come_as_frames_in_one_piece(samples):
+    found = capture_of(samples).frames(1, 5).preamble
+    assert found.flags.c_contiguous
+    np.testing.assert_array_equal(found, samples[1:5])
+
+
+def test_samples_in_memory_are_not_copied():
+    samples = noise(6, 8)
+    assert np.shares_memory(capture_of(samples).frames(2, 4).preamble, samples)
+
+
 @pytest.mark.parametrize("bad", [np.nan, np.inf])
 def test_a_bad_rf_sample_marks_its_frame_alone(bad):
     real = noise(4, 16).real.copy()

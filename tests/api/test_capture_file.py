@@ -153,9 +153,26 @@ def test_moving_objects_come_back_and_raise_the_minor_version(tmp_path):
         assert file.attrs["format_version"] == "1.1"
 
 
-def test_contiguous_samples_are_memory_mapped(path):
+def test_contiguous_samples_are_views_of_the_mapped_file(path):
     capture = open_capture(path)
-    assert all(isinstance(getattr(capture, name), np.memmap) for name in ("preamble", "sts1", "sts2"))
+    for name in ("preamble", "sts1", "sts2"):
+        first, second = (getattr(capture.frames(), name) for _ in range(2))
+        assert np.shares_memory(first, second)
+        assert not first.flags.writeable
+
+
+def test_samples_of_the_other_byte_order_are_read_in_this_machines(path):
+    expected = np.array(open_capture(path).preamble)
+    other = expected.dtype.newbyteorder("S")
+    with h5py.File(path, "a") as file:
+        del file["receivers/front/preamble"]
+        file.create_dataset("receivers/front/preamble", data=expected.astype(other))
+    capture = open_capture(path)
+    assert capture.preamble.dtype == other
+    found = capture.frames().preamble
+    assert found.dtype == expected.dtype
+    assert found.dtype.isnative
+    np.testing.assert_array_equal(found, expected)
 
 
 @pytest.mark.parametrize(

@@ -20,6 +20,7 @@ import numpy as np
 from uwbbench.api.arrays import FloatArray
 from uwbbench.api.capture import Capture, Samples
 from uwbbench.api.errors import CaptureError, nearest
+from uwbbench.api.mapped import MappedSamples
 from uwbbench.api.radar import Radar
 from uwbbench.api.truth import Obstacle, Trajectory, Truth
 
@@ -128,7 +129,7 @@ class _Reader:
             raise self.fail(where, f"expected {expected}, found {found.dtype}")
         offset = found.id.get_offset()
         if found.chunks is None and offset is not None and found.size:
-            return np.memmap(self.path, dtype=found.dtype, mode="r", offset=offset, shape=found.shape)
+            return MappedSamples(self.path, found.dtype, offset, found.shape)
         return cast(Samples, found)
 
     def track(self, where: str, shape: tuple[int, ...], *, required: bool = False) -> FloatArray | None:

@@ -2,12 +2,20 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Callable
-from typing import TypeVar, cast
+from pathlib import Path
+from typing import Any, NamedTuple, TypeVar, cast
 
 import numba
+from numba.extending import is_jitted
+
+from uwbbench.api.compiled_files import CompiledFiles
 
 F = TypeVar("F", bound=Callable[..., object])
+
+_OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy"}
+_functions: list[Any] = []
 
 
 def compiled(function: F) -> F:
@@ -15,7 +23,7 @@ def compiled(function: F) -> F:
 
     The interpreter lock is released while the function runs. A division by zero gives infinity or NaN, as in numpy.
     Operations are never reordered or contracted, so that results equal those of numpy to the last bit, and denormal
-    numbers and NaN keep their meaning.
+    numbers and NaN keep their meaning. Where the machine code is kept, :mod:`uwbbench.api.compiled_files` says.
 
     Put functions that use this into a module of their own and import it where it is first needed: numba takes longer
     to import than all that listing and describing stages needs.
@@ -28,5 +36,40 @@ def compiled(function: F) -> F:
     Returns
     -------
     callable
+
+    Raises
+    ------
+    ConfigError
+        If ``UWBBENCH_CACHE_DIR`` names a folder that everyone can write to, or that belongs to another user.
     """
-    return cast("F", numba.njit(cache=True, nogil=True, error_model="numpy")(function))
+    decorate: Any = numba.njit(**_OPTIONS)
+    dispatcher = decorate(function)
+    if is_jitted(dispatcher):  # numba hands the function itself back where compiling is switched off
+        _functions.append(dispatcher)
+        if Path(inspect.getfile(function)).is_file():  # nothing tells a stale file of what was typed at a prompt
+            dispatcher._cache = CompiledFiles(function, _OPTIONS)  # type: ignore[attr-defined]
+    return cast("F", dispatcher)
+
+
+class CompileCounts(NamedTuple):
+    """How often functions were made ready to run in this process.
+
+    Attributes
+    ----------
+    fresh : int
+        Compiled here, once for each combination of argument types.
+    loaded : int
+        Read from disk.
+    """
+
+    fresh: int
+    loaded: int
+
+
+def compile_counts() -> CompileCounts:
+    """Count what this process has compiled, and what it has loaded, so far."""
+    stats = [function.stats for function in _functions]
+    return CompileCounts(
+        fresh=sum(sum(one.cache_misses.values()) for one in stats),
+        loaded=sum(sum(one.cache_hits.values()) for one in stats),
+    )

@@ -9,10 +9,8 @@ from typing import Annotated, Any
 import typer
 
 import uwbbench
-from uwbbench import registry
 from uwbbench.api.errors import UwbbenchError
-from uwbbench.cli import describe, options, render
-from uwbbench.config.locate import shipped
+from uwbbench.cli import options, render
 
 USAGE_ERROR = 2
 
@@ -33,6 +31,8 @@ class File(StrEnum):
     DETECTOR = "detector"
     EXPERIMENT = "experiment"
     SCENE = "scene"
+    GATE = "gate"
+    TUNING = "tuning"
 
 
 def list_names(
@@ -40,6 +40,8 @@ def list_names(
     json: options.Json = False,
 ) -> None:
     """List what is installed. Nothing of it is loaded."""
+    from uwbbench import registry
+
     found = {name: _listed(name) for name in ([kind.value] if kind else registry.KINDS)}
     if json:
         render.print_json(found)
@@ -51,6 +53,9 @@ def list_names(
 
 
 def _listed(kind: Any) -> list[dict[str, str]]:
+    from uwbbench import registry
+    from uwbbench.config.locate import shipped
+
     files = shipped("detectors") if kind == "detectors" else {}
     own = {"package": f"uwbbench {uwbbench.__version__}", "problem": ""}
     rows = [{"name": name, "target": str(path), **own} for name, path in files.items()]
@@ -66,6 +71,8 @@ def show(
     json: options.Json = False,
 ) -> None:
     """Explain a plugin, or print a detector as YAML."""
+    from uwbbench.cli import describe
+
     found = describe.everything_named(name)
     if json:
         render.print_json(found)
@@ -88,6 +95,8 @@ def show(
 
 def info(capture: options.CaptureFile, json: options.Json = False) -> None:
     """Tell what a capture file holds."""
+    from uwbbench.cli import describe
+
     found = describe.capture_file(capture)
     if json:
         render.print_json(found)
@@ -116,9 +125,13 @@ def _object_text(thing: dict[str, Any]) -> str:
 
 
 def validate(
-    files: Annotated[list[Path], typer.Argument(metavar="FILE...", help="Detector, experiment or scene YAML.")],
+    files: Annotated[
+        list[Path], typer.Argument(metavar="FILE...", help="Detector, experiment, scene, gate or tuning.")
+    ],
 ) -> None:
-    """Check detector, experiment and scene files. Mistakes are named with file, line and key."""
+    """Check detector, experiment, scene, gate and tuning files. Mistakes are named with file, line and key."""
+    from uwbbench.cli import describe
+
     wrong = False
     for path in files:
         try:
@@ -138,9 +151,15 @@ def schema(
     ] = None,
 ) -> None:
     """Print a JSON Schema of such a file, for editors."""
-    from uwbbench.schema import detector_schema, experiment_schema, scene_schema
+    from uwbbench.schema import detector_schema, experiment_schema, gate_schema, scene_schema, tuning_schema
 
-    makers = {File.DETECTOR: detector_schema, File.EXPERIMENT: experiment_schema, File.SCENE: scene_schema}
+    makers = {
+        File.DETECTOR: detector_schema,
+        File.EXPERIMENT: experiment_schema,
+        File.SCENE: scene_schema,
+        File.GATE: gate_schema,
+        File.TUNING: tuning_schema,
+    }
     made = makers[file]()
     if output is None:
         render.print_json(made)
