@@ -6,15 +6,17 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.stats import binomtest
 
 from uwbbench.stats import samples_needed
 from uwbbench.timing.latency import (
     SAMPLES_NEEDED,
+    Latency,
     call_summary,
-    clustering_summary,
+    distribution,
+    kinds_summary,
     longest_run,
     percentile,
-    ratio_summary,
 )
 
 
@@ -42,23 +44,78 @@ def test_calls_longer_than_the_frame_period_are_missed() -> None:
     assert found["p90_us"] is None
 
 
+@given(st.integers(0, 40), st.integers(1, 400))
+def test_the_bounds_of_missed_deadlines_are_those_of_the_binomial_distribution(missed: int, met: int) -> None:
+    found = call_summary(np.array([2.0] * missed + [1.0] * met), deadline_us=1.0)
+    exact = binomtest(missed, missed + met).proportion_ci(0.95, "exact")
+    assert found["missed_share_low"] == pytest.approx(exact.low, abs=1e-9)
+    assert found["missed_share_high"] == pytest.approx(exact.high, abs=1e-9)
+
+
+def test_no_missed_deadline_of_few_calls_proves_little() -> None:
+    assert call_summary(np.ones(10), 2.0)["missed_share_high"] == pytest.approx(1 - 0.025 ** (1 / 10))
+
+
 def test_clustering_calls_are_told_apart_only_where_the_detector_tells() -> None:
-    times_us = np.array([1.0, 9.0, 1.0, 7.0])
-    assert clustering_summary(times_us, None) is None
-    found = clustering_summary(times_us, np.array([False, True, False, True]))
-    assert found == {"n": 2, "share": 0.5, "p50_us": 8.0, "mean_us": 8.0}
-    never = clustering_summary(times_us, np.zeros(4, bool))
-    assert never == {"n": 0, "share": 0.0, "p50_us": None, "mean_us": None}
+    assert kinds_summary(np.ones(4), None) == {"clustering": None, "plain": None}
 
 
-def test_a_drift_of_the_machine_cancels_in_the_ratio() -> None:
-    drift = np.linspace(1.0, 5.0, 40)
-    found = ratio_summary(3.0 * drift, 2.0 * drift)
-    assert (found["ratio"], found["low"], found["high"]) == pytest.approx((1.5, 1.5, 1.5))
-    assert found["blocks"] == 40
+def test_both_kinds_of_calls_have_numbers_of_their_own() -> None:
+    times_us = np.concatenate([np.arange(100.0), [900.0, 700.0]])
+    found = kinds_summary(times_us, times_us > 500)
+    assert found["clustering"] == {"n": 2, "share": 2 / 102, **distribution(np.array([900.0, 700.0]))}
+    assert found["plain"] == {"n": 100, "share": 100 / 102, **distribution(np.arange(100.0))}
+    assert found["clustering"]["p90_us"] is None
+    assert found["plain"]["p95_us"] is not None
 
 
-def test_a_ratio_of_few_blocks_has_no_interval() -> None:
-    found = ratio_summary(np.full(7, 2.0), np.ones(7))
-    assert (found["low"], found["high"]) == (None, None)
-    assert found["ratio"] == pytest.approx(2.0)
+def test_a_kind_without_calls_has_no_numbers() -> None:
+    never = kinds_summary(np.ones(4), np.zeros(4, bool))["clustering"]
+    assert never is not None
+    assert (never["n"], never["share"]) == (0, 0.0)
+    assert {never[key] for key in ("p50_us", "p90_us", "mean_us", "max_us")} == {None}
+
+
+STORED_BEFORE = {
+    "p50_us": 1.0,
+    "p90_us": None,
+    "p95_us": None,
+    "p99_us": None,
+    "mean_us": 1.0,
+    "max_us": 2.0,
+    "n": 3,
+    "throughput_us": 1.0,
+    "throughput_best_us": 1.0,
+    "amortised_us": 1.0,
+    "overhead_us": 0.1,
+    "startup_s": 0.5,
+    "peak_memory_bytes": 1,
+    "deadline_us": 10.0,
+    "missed": 0,
+    "missed_share": 0.0,
+    "longest_burst": 0,
+    "clustering": {"n": 0, "share": 0.0, "p50_us": None, "mean_us": None},
+    "ratio_to_reference": {"reference": "null", "ratio": 1.0, "low": None, "high": None, "blocks": 3},
+    "warmed": True,
+    "threads": 1,
+    "pinned": True,
+    "cpu": "some",
+    "notes": [],
+}
+"""What the first run folders hold."""
+
+
+def test_latencies_stored_before_there_were_more_numbers_still_load() -> None:
+    found = Latency.from_dict(STORED_BEFORE)
+    assert {key: getattr(found, key) for key in STORED_BEFORE} == STORED_BEFORE
+    assert (found.paced, found.missed_share_high, found.quality, found.machine) == (None, None, {}, {})
+    assert len(found.times_us) == len(found.paced_times_us) == 0
+
+
+def test_plain_values_do_not_hold_the_single_calls_and_load_again() -> None:
+    found = Latency.from_dict({**STORED_BEFORE, "times_us": [1.0, 2.0], "paced_times_us": [3.0]})
+    assert found.times_us.tolist() == [1.0, 2.0]
+    assert found.paced_times_us.tolist() == [3.0]
+    values = found.to_dict()
+    assert not {"times_us", "paced_times_us"} & set(values)
+    assert Latency.from_dict(values).to_dict() == values

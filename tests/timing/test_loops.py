@@ -1,8 +1,10 @@
 """What the timed loops hand to a detector."""
 
 import gc
+import itertools
 
 import numpy as np
+import pytest
 
 from uwbbench.api import Capture
 from uwbbench.pipeline import detector_from_yaml, load_detector
@@ -15,6 +17,9 @@ class Counting:
     def __init__(self) -> None:
         self.given: list[tuple[int, int]] = []
         self.fresh = True
+
+    def flush(self) -> None:
+        pass
 
     def step(self, frames: object) -> None:
         self.given.append((frames.first, len(frames)))  # type: ignore[attr-defined]
@@ -38,18 +43,37 @@ def test_a_second_pass_profits_nothing_from_the_first(approach: Capture) -> None
         assert stream.fresh
 
 
-def test_blocks_alternate_and_cover_the_same_frames(approach: Capture) -> None:
-    pipeline = load_detector("null")
-    first_s, second_s = loops.alternating(pipeline, pipeline, approach, approach.frames(0, 100))
-    assert len(first_s) == len(second_s) == 100 // 3  # at least 32 blocks
-    assert np.all(first_s > 0)
-    assert np.all(second_s > 0)
+def test_endless_frames_go_on_as_one_recording(approach: Capture) -> None:
+    whole = approach.frames(5, 12)
+    frames = list(itertools.islice(loops.endless(whole, 0.5), 30))
+    assert [one.first for one in frames] == list(range(5, 35))
+    assert {len(one) for one in frames} == {1}
+    times_s = np.array([one.timestamp_s[0] for one in frames])
+    assert np.all(np.diff(times_s) > 0)
+    assert times_s[7] - times_s[6] == pytest.approx(0.5)
+    assert np.array_equal(frames[17].preamble, whole.preamble[3:4])
 
 
-def test_one_frame_is_enough_to_compare(approach: Capture) -> None:
-    pipeline = load_detector("null")
-    first_s, _ = loops.alternating(pipeline, pipeline, approach, approach.frames(0, 1))
-    assert len(first_s) == 1
+@pytest.mark.parametrize("count", [1, 6])
+def test_a_warm_up_of_few_frames_comes_to_an_end(approach: Capture, count: int) -> None:
+    assert loops.warm_up(load_detector("null"), approach, approach.frames(0, count), 2) in (True, False)
+
+
+def test_a_batch_covers_all_frames_and_its_warm_up_is_not_among_the_times(approach: Capture) -> None:
+    opened: list[Counting] = []
+
+    class Opens:
+        def open(self, _: Capture) -> Counting:
+            opened.append(Counting())
+            return opened[-1]
+
+    times_us = loops.batch_times_us(Opens(), approach, approach.frames(0, 7), repeats=3)  # type: ignore[arg-type]
+    assert len(times_us) == 3
+    assert [stream.given for stream in opened] == [[(0, 7)]] * 4
+
+
+def test_reading_the_clock_takes_time() -> None:
+    assert 0 < loops.clock_us() < 1e3
 
 
 def test_the_garbage_collector_comes_back(approach: Capture) -> None:
@@ -68,7 +92,7 @@ def test_calls_that_cluster_are_marked_where_a_stage_counts_them(approach: Captu
     class Opens:
         def open(self, capture: Capture) -> object:
             stream = pipeline.open(capture)
-            stage = stream._stages[0].stage
+            stage = stream.stages[0]
             stage.clusterings = 0
             step = stage.step
 

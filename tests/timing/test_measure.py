@@ -3,6 +3,7 @@
 import dataclasses
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -32,7 +33,69 @@ def test_a_measurement_is_complete_and_consistent() -> None:
     assert found.ratio_to_reference["reference"] == "null"
     assert found.ratio_to_reference["blocks"] >= 32
     assert found.ratio_to_reference["low"] <= found.ratio_to_reference["ratio"] <= found.ratio_to_reference["high"]
+    assert found.ratio_to_reference["blocks"] >= found.ratio_to_reference["disturbed_blocks"]
+    assert found.ratio_to_reference["total_low"] <= found.ratio_to_reference["total_high"]
+    assert found.clustering is not None
+    assert found.plain is not None
+    assert found.clustering["n"] + found.plain["n"] == found.n
+    assert found.clock_us > 0
+    assert found.overhead_us > 0
+    assert found.missed == 0 or found.missed_share_low > 0
+    assert found.missed_share_high >= found.missed_share
+    assert found.instructions_per_frame is not None or found.instructions_note.startswith("not counted: ")
+    assert found.memory_growth_bytes is not None
+    assert {"minor_faults", "involuntary_switches", "load_before", "load_after"} <= set(found.quality)
+    assert found.quality["compilations"] == 0
+    assert set(found.machine["versions"]) == {"python", "numpy", "numba"}
+    assert (found.machine["core"] is not None) == found.pinned
+    assert found.paced is None
     assert "times_us" not in found.to_dict()
+
+
+def test_frames_are_handed_out_at_a_rate_where_that_is_asked_for() -> None:
+    settings = LatencyModel(reference=None, frames=10, paced_s=0.5, rate_hz=100.0)
+    found = measure(REF, read_detector("null"), settings)
+    assert found.paced is not None
+    assert (found.paced["n"], found.paced["rate_hz"], found.paced["deadline_us"]) == (50, 100.0, 10000.0)
+    assert len(found.paced_times_us) == 50
+    assert found.paced["p50_us"] == pytest.approx(np.median(found.paced_times_us))
+
+
+BUSY = """\
+import math
+
+from uwbbench.api import Detections, Params, Stage, ports
+
+
+class Work(Params):
+    rounds: int = 1
+
+
+class Busy(Stage[Work]):
+    \"\"\"Takes its time and finds nothing.\"\"\"
+
+    produces = ports("detections")
+
+    def step(self, block):
+        for _ in range(2000 * self.params.rounds):
+            math.sqrt(2.0)
+        return block.replace(detections=Detections.empty())
+"""
+
+
+def test_a_detector_that_does_three_times_the_work_is_found_slower(
+    install_plugin: Callable[..., Path], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    folder = install_plugin("busy", {"stages": {"test.busy": "busy_stage:Busy"}}, {"busy_stage.py": BUSY})
+    monkeypatch.setenv("PYTHONPATH", str(folder))
+    text = "schema: 1\nname: {0}\npipeline:\n  - {{use: test.busy, params: {{rounds: {1}}}}}\n"
+    (tmp_path / "once.yaml").write_text(text.format("once", 2))
+    thrice = detector_from_text(text.format("thrice", 6))
+    found = measure(REF, thrice, LatencyModel(reference=str(tmp_path / "once.yaml"))).ratio_to_reference
+    assert found is not None
+    assert found["reference"] == "once"
+    assert found["low"] > 1
+    assert found["ratio"] > 1.5
 
 
 def test_only_the_asked_frames_are_timed_and_that_is_said() -> None:

@@ -182,10 +182,13 @@ class Report:
         for entry in self._of_kind("latency"):
             facts = dict(entry.facts)
             ratio, clustering = facts.pop("ratio_to_reference") or {}, facts.pop("clustering") or {}
+            for name in ("plain", "paced", "quality", "machine"):  # only in the JSON; older runs have none
+                facts.pop(name, None)
             facts["notes"] = "; ".join(facts["notes"])
             about = {"detector": entry.detector, "dataset": entry.dataset, "capture": entry.capture}
             extra = {"ratio_low": ratio.get("low"), "ratio_high": ratio.get("high"), "ratio": ratio.get("ratio")}
             extra |= {"reference": ratio.get("reference"), "clustering_p50_us": clustering.get("p50_us")}
+            extra |= {"total_ratio": ratio.get("total_ratio"), "missed_share_high": facts.get("missed_share_high")}
             rows.append({**about, **facts, **extra})
         return pd.DataFrame(rows)
 

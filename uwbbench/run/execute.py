@@ -308,6 +308,8 @@ class _Run:
             self._journal(entry_of(unit, "failed", reason=reason_of(error), traceback=traceback.format_exc()))
             return
         self.folder.write_times(unit.id, latency.times_us, latency.to_dict())
+        if latency.paced is not None:
+            self.folder.write_times(f"{unit.id}-paced", latency.paced_times_us, latency.paced)
         facts = {**latency.to_dict(), "elapsed_s": time.perf_counter() - started}
         identity = identity_of(unit, sha256, self._basis(unit))
         capture_id = unit.capture_id if sha256 else ""

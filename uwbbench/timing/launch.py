@@ -16,7 +16,6 @@ from uwbbench.api.errors import UwbbenchError
 from uwbbench.config.detector import DetectorConfig, read_detector
 from uwbbench.config.source import CaptureRef
 from uwbbench.timing.latency import Latency
-from uwbbench.timing.machine import cpu_model
 from uwbbench.timing.settings import LatencyModel
 
 ONE_THREAD = dict.fromkeys(
@@ -64,6 +63,9 @@ def measure(ref: CaptureRef, detector: DetectorConfig, settings: LatencyModel | 
         "capture": {**asdict(ref), "roots": list(ref.roots)},
         "frames": settings.frames,
         "warmup_windows": settings.warmup_windows,
+        "blocks": settings.blocks,
+        "paced_s": settings.paced_s,
+        "rate_hz": settings.rate_hz,
         "reference": reference,
         # The clock is the same in all processes of a machine.
         "started": perf_counter(),
@@ -76,7 +78,7 @@ def measure(ref: CaptureRef, detector: DetectorConfig, settings: LatencyModel | 
             input=yaml.safe_dump(spec, sort_keys=False),
             capture_output=True,
             text=True,
-            timeout=settings.timeout_s,
+            timeout=settings.timeout_s + (settings.paced_s or 0.0),
             env={**os.environ, **ONE_THREAD},
             check=False,
         )
@@ -84,7 +86,7 @@ def measure(ref: CaptureRef, detector: DetectorConfig, settings: LatencyModel | 
         raise LatencyError(f"detector '{detector.name}' was not timed within {settings.timeout_s:g} s") from None
     if done.returncode != 0:
         raise _failure(detector.name, done)
-    return Latency.from_dict({**json.loads(done.stdout), "cpu": cpu_model()})
+    return Latency.from_dict(json.loads(done.stdout))
 
 
 def _failure(name: str, done: subprocess.CompletedProcess[str]) -> LatencyError:

@@ -6,10 +6,12 @@ magnitudes), and a second detector, or a second pass, would get that for nothing
 
 from __future__ import annotations
 
+import dataclasses
 import gc
+import itertools
 from collections.abc import Iterator
 from contextlib import contextmanager
-from time import perf_counter
+from time import perf_counter_ns
 from typing import Any
 
 import numpy as np
@@ -17,22 +19,39 @@ import numpy as np
 from uwbbench.api.arrays import BoolArray, FloatArray
 from uwbbench.api.capture import Capture
 from uwbbench.api.frames import Frames
-from uwbbench.pipeline import BATCH_FRAMES, Pipeline, Stream
+from uwbbench.pipeline import BATCH_FRAMES, Pipeline
+from uwbbench.stream import Stream
 
 WINDOW_FRAMES = 200
-"""Frames of a warm-up window."""
+"""Frames of one pass of a warm-up window, at most."""
+
+WINDOW_S = 0.02
+"""A window of fast calls repeats its pass for this long: a processor takes milliseconds to raise its clock."""
+
+SLOW_WINDOW_S = 1.0
+"""A window of slow calls ends after about this long, but not before ``SLOW_WINDOW_CALLS`` calls."""
+SLOW_WINDOW_CALLS = 20
 
 AGREEMENT = 0.05
 """Two warm-up windows whose medians differ by less than this share agree."""
-
-MINIMUM_BLOCKS = 32
-BLOCK_FRAMES = 20
-"""Blocks of the comparison with the reference: this many frames, or fewer where that gave too few blocks."""
 
 
 def cut(whole: Frames, size: int) -> list[Frames]:
     """Fresh consecutive blocks of preloaded frames."""
     return [whole.part(start, min(start + size, len(whole))) for start in range(0, len(whole), size)]
+
+
+def endless(whole: Frames, period_s: float) -> Iterator[Frames]:
+    """Single frames without end: the preloaded ones again and again, with numbers and times that go on.
+
+    A stream then sees one long recording, in which the robot is put back to its start now and then.
+    """
+    lap_s = float(whole.timestamp_s[-1] - whole.timestamp_s[0]) + period_s
+    for lap in itertools.count():
+        first, timestamp_s = whole.first + lap * len(whole), whole.timestamp_s + lap * lap_s
+        again = dataclasses.replace(whole, first=first, timestamp_s=timestamp_s)
+        for at in range(len(again)):
+            yield again.part(at, at + 1)
 
 
 @contextmanager
@@ -48,52 +67,79 @@ def quiet() -> Iterator[None]:
         gc.unfreeze()
 
 
+def clock_us(readings: int = 1001) -> float:
+    """Median time between two readings of the clock with nothing between them, in microseconds."""
+    gaps_ns = np.empty(readings)
+    for index in range(readings):
+        start = perf_counter_ns()
+        gaps_ns[index] = perf_counter_ns() - start
+    return float(np.median(gaps_ns)) * 1e-3
+
+
 def call_times_us(stream: Stream, calls: list[Frames]) -> FloatArray:
     """Time of every call (calls,)."""
-    times = np.empty(len(calls))
+    step = stream.step
+    times_ns = np.empty(len(calls))
     for index, frames in enumerate(calls):
-        start = perf_counter()
-        stream.step(frames)
-        times[index] = perf_counter() - start
-    return times * 1e6
+        start = perf_counter_ns()
+        step(frames)
+        times_ns[index] = perf_counter_ns() - start
+    return times_ns * 1e-3
 
 
 def warm_up(pipeline: Pipeline, capture: Capture, whole: Frames, windows: int) -> bool:
     """Run until two windows in a row agree; whether they did within the limit.
 
-    Each window is flushed, so that what a stage imports or compiles only then is warm too.
+    Every pass is a stream of its own and is flushed, so that what a stage imports or compiles only then is warm too.
     """
-    window = whole.part(0, min(len(whole), WINDOW_FRAMES))
     before = np.inf
     for _ in range(windows):
-        stream = pipeline.open(capture)
-        now = float(np.median(call_times_us(stream, cut(window, 1))))
-        stream.flush()
+        now = _window_us(pipeline, capture, whole)
         if abs(now - before) <= AGREEMENT * now:
             return True
         before = now
     return False
 
 
+def _window_us(pipeline: Pipeline, capture: Capture, whole: Frames) -> float:
+    """Median call of a window."""
+    times_us: list[float] = []
+    spent_us = 0.0
+    while spent_us < WINDOW_S * 1e6:
+        stream = pipeline.open(capture)
+        for calls in _chunks(whole):
+            passed = call_times_us(stream, calls)
+            times_us += passed.tolist()
+            spent_us += float(passed.sum())
+            if spent_us > SLOW_WINDOW_S * 1e6:
+                break
+        stream.flush()
+    return float(np.median(times_us))
+
+
+def _chunks(whole: Frames) -> list[list[Frames]]:
+    calls = cut(whole.part(0, WINDOW_FRAMES), 1)
+    return [calls[start : start + SLOW_WINDOW_CALLS] for start in range(0, len(calls), SLOW_WINDOW_CALLS)]
+
+
 def stream_pass(pipeline: Pipeline, capture: Capture, whole: Frames) -> tuple[FloatArray, BoolArray | None, float]:
     """One frame a call: time of every call, which calls clustered, and the time of the flush, in microseconds."""
     stream, calls = pipeline.open(capture), cut(whole, 1)
     counters = [stage for stage in stream.stages if hasattr(stage, "clusterings")]
-    clustered = np.zeros(len(calls), bool)
-    times_us = np.empty(len(calls))
-    before = 0
+    counts = np.zeros(len(calls) + 1, np.int64)
+    times_ns = np.empty(len(calls))
+    step = stream.step
     with quiet():
         for index, frames in enumerate(calls):
-            start = perf_counter()
-            stream.step(frames)
-            times_us[index] = (perf_counter() - start) * 1e6
-            count = _total(counters)
-            clustered[index] = count > before
-            before = count
-        start = perf_counter()
+            start = perf_counter_ns()
+            step(frames)
+            times_ns[index] = perf_counter_ns() - start
+            if counters:
+                counts[index + 1] = _total(counters)
+        start = perf_counter_ns()
         stream.flush()
-        flush_us = (perf_counter() - start) * 1e6
-    return times_us, clustered if counters else None, flush_us
+        flush_us = (perf_counter_ns() - start) * 1e-3
+    return times_ns * 1e-3, np.diff(counts) > 0 if counters else None, flush_us
 
 
 def _total(counters: list[Any]) -> int:
@@ -101,34 +147,15 @@ def _total(counters: list[Any]) -> int:
 
 
 def batch_times_us(pipeline: Pipeline, capture: Capture, whole: Frames, repeats: int = 5) -> FloatArray:
-    """Time a frame of repeated batch runs (repeats,)."""
-    times = []
-    for _ in range(repeats):
-        stream, blocks = pipeline.open(capture), cut(whole, BATCH_FRAMES)
-        with quiet():
-            start = perf_counter()
-            for frames in blocks:
-                stream.step(frames)
-            stream.flush()
-            times.append((perf_counter() - start) * 1e6 / len(whole))
-    return np.array(times)
-
-
-def alternating(first: Pipeline, second: Pipeline, capture: Capture, whole: Frames) -> tuple[FloatArray, FloatArray]:
-    """Times (blocks,) of two detectors that take turns on the same frames, block by block, in the order ABBA.
-
-    Slow drift of the machine (its clock, its other work) meets both alike and cancels in the ratio of a block.
-    """
-    size = min(BLOCK_FRAMES, max(1, len(whole) // MINIMUM_BLOCKS))
-    streams = first.open(capture), second.open(capture)
-    calls = cut(whole, 1), cut(whole, 1)
-    spent = np.zeros((len(whole) // size, 2))
+    """Time a frame of repeated batch runs (repeats,); one more before them only warms up."""
+    times_us = np.empty(repeats + 1)
     with quiet():
-        for block, times in enumerate(spent):
-            part = slice(block * size, (block + 1) * size)
-            for who in (0, 1) if block % 2 == 0 else (1, 0):
-                start = perf_counter()
-                for frames in calls[who][part]:
-                    streams[who].step(frames)
-                times[who] = perf_counter() - start
-    return spent[:, 0], spent[:, 1]
+        for repeat in range(repeats + 1):
+            stream, blocks = pipeline.open(capture), cut(whole, BATCH_FRAMES)
+            step = stream.step
+            start = perf_counter_ns()
+            for frames in blocks:
+                step(frames)
+            stream.flush()
+            times_us[repeat] = (perf_counter_ns() - start) * 1e-3 / len(whole)
+    return times_us[1:]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import platform
+from importlib import metadata
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,39 @@ def machine() -> dict[str, Any]:
         "usable_cores": usable_cores(),
         "os": platform.platform(),
         "architecture": platform.machine(),
+        "governor": governor(),
+        "turbo": turbo(),
     }
+
+
+def versions() -> dict[str, str]:
+    """Of the interpreter and the libraries that decide how fast a detector runs."""
+    return {"python": platform.python_version(), **{name: metadata.version(name) for name in ("numpy", "numba")}}
+
+
+def load() -> float | None:
+    """Processes that ran or waited for a core, mean of the last minute; None where the system does not tell."""
+    return os.getloadavg()[0] if hasattr(os, "getloadavg") else None
+
+
+def governor(root: Path = Path("/sys/devices/system/cpu")) -> str | None:
+    """Rule by which the first core's frequency is chosen; None where the system does not tell."""
+    return _line(root / "cpu0/cpufreq/scaling_governor")
+
+
+def turbo(root: Path = Path("/sys/devices/system/cpu")) -> bool | None:
+    """Whether cores may run above their nominal frequency; None where the system does not tell."""
+    boost, no_turbo = _line(root / "cpufreq/boost"), _line(root / "intel_pstate/no_turbo")
+    if boost is not None:
+        return boost == "1"
+    return None if no_turbo is None else no_turbo == "0"
+
+
+def _line(path: Path) -> str | None:
+    try:
+        return path.read_text().strip()
+    except OSError:  # virtual machines and other systems have no such file
+        return None
 
 
 def usable_cores() -> int:

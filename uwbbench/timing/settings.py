@@ -20,4 +20,11 @@ class LatencyModel(BaseModel):
         default="paper-filtering",
         description="Detector that each one is compared with, in alternating blocks; null: none.",
     )
-    timeout_s: float = Field(default=600.0, gt=0, description="A measurement that takes longer has failed.")
+    blocks: int = Field(default=100, ge=8, description="Alternating blocks at least; more give a narrower interval.")
+    paced_s: float | None = Field(
+        default=None, gt=0, description="Also hand out frames at a fixed rate for this long; null: do not."
+    )
+    rate_hz: float | None = Field(default=None, gt=0, description="That rate; null: the capture's own.")
+    timeout_s: float = Field(
+        default=600.0, gt=0, description="A measurement that takes longer has failed; the paced pass is not counted."
+    )
