@@ -8,9 +8,7 @@ from typing import ClassVar
 import numpy as np
 from pydantic import Field
 
-from uwbbench.api import Block, ConfigError, Params, Radar, Stage, ports
-from uwbbench_detectors.first_path import log_parabola
-from uwbbench_detectors.noise import rayleigh_rms, rms
+from uwbbench.api import Block, ComplexArray, ConfigError, FloatArray, Params, Radar, Stage, ports
 
 UPSAMPLING = 16
 """Points a tap at which the band-limited response is searched for its crest."""
@@ -70,40 +68,36 @@ class Align(Stage[AlignParams]):
                 f"align: crest_within_taps is {p.crest_within_taps}, but the radar's first {radar.noise_taps} taps "
                 f"precede any arrival, and a frame has {radar.taps} taps"
             )
-        self._grid = np.arange(radar.noise_taps * UPSAMPLING, stop * UPSAMPLING) / UPSAMPLING
-        self._turn = 2j * np.pi * np.fft.fftfreq(radar.taps)
-        self._kernel = np.exp(self._turn[:, None] * self._grid) / radar.taps
+        grid = np.arange(radar.noise_taps * UPSAMPLING, stop * UPSAMPLING) / UPSAMPLING
+        turn: FloatArray = 2 * np.pi * np.asarray(np.fft.fftfreq(radar.taps), dtype=np.float64)
+        half = turn[: radar.taps // 2 + 1]
+        fine = np.exp(1j * half[:, None] * grid) / radar.taps
+        from uwbbench_detectors.align_loops import turned_spectra
+
+        self._turned_spectra = turned_spectra
+        self._settings: tuple[FloatArray, FloatArray, FloatArray, ComplexArray, int, float] = (
+            np.stack([fine.real, fine.imag]),
+            grid,
+            half,
+            np.exp(-1j * turn * p.to_tap),
+            radar.noise_taps,
+            10 ** (p.minimum_snr_db / 20),
+        )
 
     def step(self, block: Block) -> Block:
         """Block with aligned frames."""
         if self._skips:
             return block
         frames = block.frames
-        samples = frames.preamble.astype(np.complex128)
-        spectrum = np.fft.fft(samples, axis=1)
-        # One product a frame, not one for the block: BLAS rounds differently for other numbers of rows.
-        fine = np.abs(spectrum[:, None, :] @ self._kernel)[:, 0]
-        peak = np.argmax(fine, axis=1)
-        crest_tap = self._grid[peak] + log_parabola(fine, peak) / UPSAMPLING
-        # Operands have names, since numpy may swap large temporary ones, and then a complex product rounds otherwise.
-        to_crest = np.exp(self._turn * crest_tap[:, None])
-        crest = np.mean(spectrum * to_crest, axis=1)
-
-        leading = self.radar.noise_taps
-        noise = rms(frames.amplitude[:, :leading]) if leading else rayleigh_rms(frames.amplitude)
-        height = np.abs(crest)
-        # The reciprocal of a denormal number overflows.
-        divides = height >= np.finfo(float).tiny
-        clear = frames.valid & divides & (height >= 10 ** (self.params.minimum_snr_db / 20) * noise)
+        samples = np.ascontiguousarray(frames.preamble, dtype=np.complex128)
+        spectra = np.fft.fft(samples, axis=1)
+        turned, crest_tap, clear = self._turned_spectra(samples, spectra, frames.valid, *self._settings)
         if not clear[frames.valid].all():
             self.note(
                 "align: frames whose direct path stands less than "
                 f"{self.params.minimum_snr_db:g} dB above the noise were refused and yield nothing"
             )
-        to_target = np.exp(self._turn * (crest_tap - self.params.to_tap)[:, None])
-        shifted = np.fft.ifft(spectrum * to_target, axis=1)[clear]
-        aligned = np.zeros(samples.shape, dtype=np.complex128)
-        aligned[clear] = shifted / crest[clear, None]
+        aligned = np.fft.ifft(turned, axis=1)
         reported = frames.first_path_index
         if reported is not None:
             reported = np.where(clear, reported + self.params.to_tap - crest_tap, reported)

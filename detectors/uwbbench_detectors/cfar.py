@@ -5,15 +5,11 @@ from __future__ import annotations
 from typing import ClassVar, Literal, Self, TypeVar
 
 import numpy as np
-from numpy.lib.stride_tricks import sliding_window_view
 from pydantic import Field, field_validator, model_validator
 
-from uwbbench.api import Block, BoolArray, ConfigError, Detections, FloatArray, Params, Radar, Stage, ports
+from uwbbench.api import Block, ConfigError, Detections, Params, Radar, Stage, ports
 from uwbbench_detectors.cfar_factors import Statistic, TrainingWindow, order_rank, threshold_factor
 from uwbbench_detectors.profile import profile_start
-
-SORTED_AT_ONCE = 2**22
-"""Training cells in memory at a time while order statistics are taken."""
 
 
 class CfarParams(Params):
@@ -91,8 +87,8 @@ class Cfar(Stage[P]):
 
     A cell ``|h|^2`` is detected where it exceeds ``factor * z``; subclasses say what ``z`` is. Near the edges of the
     frame, where one side has fewer than N/2 training cells, the other side alone is used, with a factor made for N/2
-    cells: the false-alarm rate holds there too, at some loss of sensitivity. Sums are taken directly; running sums
-    would lose every digit behind a direct path 120 dB above the noise.
+    cells: the false-alarm rate holds there too, at some loss of sensitivity. Sums are made of sums, never of
+    differences, which would lose every digit behind a direct path 120 dB above the noise.
 
     ``score_db`` is the cell over ``z``. Where ``z`` is zero there is no noise to compare with and no rate that a
     threshold could keep: nothing is detected, and a note says so if something is there.
@@ -128,6 +124,18 @@ class Cfar(Stage[P]):
             raise ConfigError(
                 f"{name}: false_alarm_rate {p.false_alarm_rate:g} puts thresholds below the noise estimate; lower it"
             )
+        from uwbbench_detectors import cfar_windows
+
+        self._detect = cfar_windows.detect
+        self._settings = (
+            self._start,
+            self._half,
+            self._guard,
+            self._factor,
+            getattr(cfar_windows, self.statistic.upper()),
+            (order_rank(self._rank, self._half), order_rank(self._rank, 2 * self._half)),
+            max(self._guard, 1) if p.cells == "maxima" else 0,
+        )
 
     @property
     def _rank(self) -> float:
@@ -142,83 +150,20 @@ class Cfar(Stage[P]):
             self.statistic, window, self.params.false_alarm_rate, self._rank, bandwidth if correlated else None
         )
 
-    def estimate(self, power: FloatArray) -> FloatArray:
-        """Noise estimate ``z`` of every cell.
-
-        Parameters
-        ----------
-        power : (frames, cells) array
-
-        Returns
-        -------
-        (frames, cells) array
-        """
-        raise NotImplementedError
-
     def step(self, block: Block) -> Block:
         """Block with the detected cells, by frame and then tap."""
-        amplitude = block.frames.amplitude
-        power = amplitude[:, self._start :] ** 2
-        noise = self.estimate(power)
-        detected = (power > self._factor * noise) & (noise > 0)
-        if ((power > 0) & (noise == 0)).any():
+        frames = block.frames
+        row, tap, amplitude, score_db, silent = self._detect(frames.amplitude, *self._settings)
+        if silent:
             self.note(
                 f"cfar.{self.statistic}: some taps with a signal have training taps that are all zero; without noise "
                 "there is no threshold, and nothing is detected in them"
             )
-        if self.params.cells == "maxima":
-            detected &= _crests(amplitude, max(self._guard, 1))[:, self._start :]
-        row, cell = np.nonzero(detected)
-        tap = cell + self._start
-        found = Detections(
-            block.frames.index[row],
-            processed=block.frames.index,
-            tap=tap,
-            amplitude=amplitude[row, tap],
-            score_db=10 * (np.log10(power[row, cell]) - np.log10(noise[row, cell])),
-        )
+        found = Detections(row + frames.first, processed=frames.index, tap=tap, amplitude=amplitude, score_db=score_db)
         return block.replace(detections=found)
 
 
-def _crests(amplitude: FloatArray, reach: int) -> BoolArray:
-    """Mask of the taps that no tap within ``reach`` exceeds; the first of equal ones."""
-    crest = np.ones(amplitude.shape, bool)
-    for step in range(1, min(reach, amplitude.shape[1] - 1) + 1):
-        earlier, later = amplitude[:, :-step], amplitude[:, step:]
-        crest[:, step:] &= later > earlier
-        crest[:, :-step] &= earlier >= later
-    return crest
-
-
-class HalvesCfar(Cfar[CfarParams]):
-    """A CFAR whose noise estimate is made of the mean power of the two sides."""
-
-    def combine(self, left: FloatArray, right: FloatArray) -> FloatArray:
-        """Estimate from the means of both sides, arrays of one shape."""
-        raise NotImplementedError
-
-    def estimate(self, power: FloatArray) -> FloatArray:
-        """Noise estimate of every cell (frames, cells)."""
-        half, edge = self._half, self._edge
-        windows = power.shape[1] - half + 1
-        mean = np.zeros((len(power), windows))
-        for offset in range(half):
-            mean += power[:, offset : offset + windows]
-        mean /= half
-        # The window that starts at tap w lies right of cell w - guard - 1 and left of cell w + half + guard.
-        beyond = self._guard + 1
-        inner = power.shape[1] - 2 * edge
-        return np.concatenate(
-            [
-                mean[:, beyond : beyond + edge],
-                self.combine(mean[:, :inner], mean[:, edge + beyond : edge + beyond + inner]),
-                mean[:, inner : inner + edge],
-            ],
-            axis=1,
-        )
-
-
-class CellAveraging(HalvesCfar):
+class CellAveraging(Cfar[CfarParams]):
     """CA-CFAR: the noise is the mean of all training cells.
 
     The most sensitive one in even noise; a second echo or a step of clutter among the training cells raises the
@@ -231,12 +176,8 @@ class CellAveraging(HalvesCfar):
 
     statistic = "ca"
 
-    def combine(self, left: FloatArray, right: FloatArray) -> FloatArray:
-        """Mean of both sides."""
-        return (left + right) / 2
 
-
-class GreatestOf(HalvesCfar):
+class GreatestOf(Cfar[CfarParams]):
     """GO-CFAR: the noise is the larger of the two sides' means.
 
     Keeps the false-alarm rate down at steps of clutter, and hides the weaker one of two near echoes.
@@ -248,12 +189,8 @@ class GreatestOf(HalvesCfar):
 
     statistic = "go"
 
-    def combine(self, left: FloatArray, right: FloatArray) -> FloatArray:
-        """Larger of both sides."""
-        return np.asarray(np.maximum(left, right))
 
-
-class SmallestOf(HalvesCfar):
+class SmallestOf(Cfar[CfarParams]):
     """SO-CFAR: the noise is the smaller of the two sides' means.
 
     Finds an echo beside a stronger one, at many more false alarms where the clutter steps.
@@ -264,10 +201,6 @@ class SmallestOf(HalvesCfar):
     """
 
     statistic = "so"
-
-    def combine(self, left: FloatArray, right: FloatArray) -> FloatArray:
-        """Smaller of both sides."""
-        return np.asarray(np.minimum(left, right))
 
 
 class OrderedStatisticParams(CfarParams):
@@ -297,29 +230,3 @@ class OrderedStatistic(Cfar[OrderedStatisticParams]):
     @property
     def _rank(self) -> float:
         return self.params.rank
-
-    def estimate(self, power: FloatArray) -> FloatArray:
-        """Noise estimate of every cell (frames, cells)."""
-        at_once = max(SORTED_AT_ONCE // (power.shape[1] * 2 * self._half), 1)
-        parts = [self._estimate(power[start : start + at_once]) for start in range(0, len(power), at_once)]
-        return np.concatenate(parts) if parts else np.empty_like(power)
-
-    def _estimate(self, power: FloatArray) -> FloatArray:
-        half, edge = self._half, self._edge
-        side = sliding_window_view(power, half, axis=1)
-        beyond = self._guard + 1
-        inner = power.shape[1] - 2 * edge
-        both = np.concatenate([side[:, :inner], side[:, edge + beyond : edge + beyond + inner]], axis=2)
-        return np.concatenate(
-            [
-                self._ranked(side[:, beyond : beyond + edge]),
-                self._ranked(both),
-                self._ranked(side[:, inner : inner + edge]),
-            ],
-            axis=1,
-        )
-
-    def _ranked(self, cells: FloatArray) -> FloatArray:
-        """The k-th smallest of the last axis."""
-        place = order_rank(self.params.rank, cells.shape[-1]) - 1
-        return np.asarray(np.partition(cells, place, axis=-1)[..., place])

@@ -12,27 +12,9 @@ from typing import ClassVar, TypeVar
 import numpy as np
 from pydantic import Field
 
-from uwbbench.api import Block, BoolArray, ComplexArray, IntArray, Params, Radar, Stage, ports
+from uwbbench.api import Block, ComplexArray, IntArray, Params, Radar, Stage, ports
 
 P = TypeVar("P", bound=Params)
-EPSILON = float(np.finfo(float).eps)
-
-
-def without_rounding(residue: ComplexArray, samples: ComplexArray, operations: int | IntArray) -> ComplexArray:
-    """Residue (frames, taps) of a subtraction, with what is rounding error alone set to zero.
-
-    Equal frames would otherwise leave a ripple in the last place, which a later normalisation would blow up to full
-    scale.
-
-    Parameters
-    ----------
-    residue, samples : (frames, taps) arrays
-        What is left of the samples.
-    operations : int or (frames,) array
-        Additions behind each value: the rounding error is at most this many epsilons of the largest sample.
-    """
-    bound = operations * EPSILON * np.abs(samples).max(axis=1)
-    return np.where(np.abs(residue) > bound[:, None], residue, 0)
 
 
 class ClutterRemoval(Stage[P]):
@@ -55,13 +37,23 @@ class ClutterRemoval(Stage[P]):
         """
         raise NotImplementedError
 
+    def open(self, radar: Radar) -> None:
+        """Load the inner loops."""
+        super().open(radar)
+        from uwbbench_detectors import clutter_loops
+
+        self.loops = clutter_loops
+
     def step(self, block: Block) -> Block:
         """Block with cleaned frames."""
         frames = block.frames
-        usable: BoolArray = frames.valid & frames.preamble.any(axis=1)
-        cleaned = np.zeros(frames.preamble.shape, dtype=np.complex128)
+        samples = np.ascontiguousarray(frames.preamble, dtype=np.complex128)
+        usable = self.loops.usable_frames(samples, frames.valid)
+        if usable.all():
+            return block.replace(frames=frames.with_preamble(self.remove(samples, frames.index)))
+        cleaned = np.zeros_like(samples)
         if usable.any():
-            cleaned[usable] = self.remove(frames.preamble[usable].astype(np.complex128), frames.index[usable])
+            cleaned[usable] = self.remove(samples[usable], frames.index[usable])
         return block.replace(frames=frames.with_preamble(cleaned))
 
 
@@ -90,45 +82,14 @@ class MeanClutter(ClutterRemoval[MeanClutterParams]):
         super().open(radar)
         self._count = 0
         self._head = np.zeros(radar.taps, dtype=np.complex128)
-        if self.params.window_frames is not None:
-            self._stretch = np.zeros((self.params.window_frames, radar.taps), dtype=np.complex128)
-            self._tail = np.zeros((self.params.window_frames, radar.taps), dtype=np.complex128)
+        self._stretch = np.zeros((self.params.window_frames or 0, radar.taps), dtype=np.complex128)
+        self._tail = np.zeros_like(self._stretch)
 
     def remove(self, samples: ComplexArray, index: IntArray) -> ComplexArray:  # noqa: ARG002
         """Frames minus their running mean."""
-        window = self.params.window_frames
-        count = self._count + 1 + np.arange(len(samples))
-        if window is None:
-            total = self._sums(samples)
-        else:
-            total = np.empty_like(samples)
-            start = 0
-            while start < len(samples):
-                place = (self._count + start) % window
-                stop = min(start + window - place, len(samples))
-                total[start:stop] = self._windowed(samples[start:stop], place)
-                start = stop
-            count = np.minimum(count, window)
+        residue: ComplexArray = self.loops.less_mean(samples, self._count, self._head, self._stretch, self._tail)
         self._count += len(samples)
-        return without_rounding(samples - total / count[:, None], samples, 2 * count)
-
-    def _sums(self, samples: ComplexArray) -> ComplexArray:
-        """Sums of the current stretch up to each row, added one row after the other."""
-        total = np.cumsum(np.concatenate([self._head[None], samples]), axis=0)
-        self._head = total[-1].copy()
-        return total[1:]
-
-    def _windowed(self, samples: ComplexArray, place: int) -> ComplexArray:
-        """Sums of the last ``window_frames`` rows, for rows from ``place`` on in the current stretch."""
-        end = place + len(samples)
-        self._stretch[place:end] = samples
-        total = self._sums(samples)
-        older = self._tail[place + 1 : end + 1]
-        total[: len(older)] += older
-        if end == len(self._stretch):
-            self._tail = np.cumsum(self._stretch[::-1], axis=0)[::-1]
-            self._head = np.zeros_like(self._head)
-        return total
+        return residue
 
 
 class ExponentialClutterParams(Params):
@@ -160,36 +121,26 @@ class ExponentialClutter(ClutterRemoval[ExponentialClutterParams]):
     def open(self, radar: Radar) -> None:
         """Start without a background."""
         super().open(radar)
-        self._background: ComplexArray | None = None
+        self._background = np.zeros(radar.taps, dtype=np.complex128)
         self._variance = np.zeros(radar.taps)
-        self._residues = 0
+        self._count = 0
 
     def remove(self, samples: ComplexArray, index: IntArray) -> ComplexArray:  # noqa: ARG002
         """Frames minus the background before them."""
-        # A loop over frames: importing scipy.signal for its filter takes longer than thousands of these rows.
-        cleaned = np.empty_like(samples)
-        background = samples[0] if self._background is None else self._background
-        gain = 1 - self.params.memory
-        for row, frame in enumerate(samples):
-            residue = np.subtract(frame, background, out=cleaned[row])
-            step = gain * residue
-            if self.params.adaptive:
-                step = np.where(self._learns(residue), step, 0)
-            background = background + step
-        self._background = background
-        return without_rounding(cleaned, samples, math.ceil(4 / gain))
-
-    def _learns(self, residue: ComplexArray) -> BoolArray:
-        """Mark the taps that may enter the background, and update their variance."""
-        power = residue.real**2 + residue.imag**2
-        share = 1 - self.params.spread_memory
-        self._residues += 1
-        learning = power <= self.params.gate_sigmas**2 * self._variance
-        if self._residues <= math.ceil(1 / share):
-            learning = np.ones_like(learning)
-        gain = max(1 / self._residues, share)
-        self._variance = np.where(learning, self._variance + gain * (power - self._variance), self._variance)
-        return learning
+        p = self.params
+        gain = 1 - p.memory
+        operations = float(math.ceil(4 / gain))
+        if self._count == 0 and len(samples):
+            self._background[:] = samples[0]
+        if p.adaptive:
+            settings = (gain, 1 - p.spread_memory, p.gate_sigmas**2, operations)
+            residue: ComplexArray = self.loops.less_selective(
+                samples, self._background, self._variance, self._count, settings
+            )
+        else:
+            residue = self.loops.less_exponential(samples, self._background, gain, operations)
+        self._count += len(samples)
+        return residue
 
 
 class TemplateClutterParams(Params):
@@ -228,9 +179,8 @@ class TemplateClutter(ClutterRemoval[TemplateClutterParams]):
         cleaned = np.zeros_like(samples)
         later = samples[max(missing, 0) :]
         if len(later):
-            gain = np.sum(later * self._weights, axis=1)
-            residue = later - gain[:, None] * self._template
-            cleaned[-len(later) :] = without_rounding(residue, later, self.params.frames + later.shape[1])
+            operations = float(self.params.frames + later.shape[1])
+            cleaned[-len(later) :] = self.loops.less_template(later, self._template, self._weights, operations)
         return cleaned
 
     def flush(self) -> None:

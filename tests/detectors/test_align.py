@@ -6,6 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from uwbbench.api import ConfigError
+from uwbbench_detectors.first_path import log_parabola
 
 FRAMES = 30
 TAP = np.arange(50)
@@ -127,3 +128,23 @@ def test_a_target_outside_the_frame_is_refused(make_radar, make_stage):
 def test_a_search_window_inside_the_noise_taps_is_refused(make_radar, make_stage):
     with pytest.raises(ConfigError, match="precede any arrival"):
         make_stage("align", crest_within_taps=4).open(make_radar())
+
+
+@pytest.mark.parametrize("taps", [31, 50, 64])
+@pytest.mark.parametrize("to_tap", [7.0, 9.3])
+def test_aligned_frames_are_those_of_the_formula_in_numpy(
+    taps, to_tap, make_radar, make_block, make_stage, make_echoes, run_stage
+):
+    samples = make_echoes(20, taps) * np.exp(2j * np.arange(20)[:, None])
+    frequency = np.fft.fftfreq(taps)
+    grid = np.arange(4 * 16, 8 * 16) / 16
+    spectra = np.fft.fft(samples, axis=1)
+    fine = np.abs(spectra @ np.exp(2j * np.pi * np.outer(frequency, grid)) / taps)
+    peak = np.argmax(fine, axis=1)
+    crest_tap = grid[peak] + log_parabola(fine, peak) / 16
+    crest = np.mean(spectra * np.exp(2j * np.pi * frequency * crest_tap[:, None]), axis=1)
+    moved = np.exp(2j * np.pi * frequency * (crest_tap - to_tap)[:, None])
+    expected = np.fft.ifft(spectra * moved, axis=1) / crest[:, None]
+    stage = make_stage("align", to_tap=to_tap, minimum_snr_db=-100.0)
+    aligned = run_stage(stage, make_radar(taps), make_block(samples)).frames.preamble
+    np.testing.assert_allclose(aligned, expected, rtol=0, atol=1e-13)

@@ -201,14 +201,6 @@ def test_cutting_the_stream_changes_nothing(make_radar, make_block, run_cut, mak
     assert not np.isin(found.frame, [5, 11]).any()  # an invalid frame and one of zeros
 
 
-def test_long_frames_are_sorted_in_pieces_with_the_same_result(make_radar, make_block, run_cut, monkeypatch):
-    block = make_block(complex_noise((40, 50), seed=3))
-    whole = run_cut("cfar.os", {"false_alarm_rate": 0.05}, make_radar(), block, [])
-    monkeypatch.setattr("uwbbench_detectors.cfar.SORTED_AT_ONCE", 3 * 46 * 12)
-    pieces = run_cut("cfar.os", {"false_alarm_rate": 0.05}, make_radar(), block, [])
-    np.testing.assert_array_equal(whole.detections["tap"], pieces.detections["tap"])
-
-
 @pytest.mark.parametrize(
     ("params", "taps", "message"),
     [

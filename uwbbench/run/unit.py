@@ -121,7 +121,7 @@ def _detected(job: Job) -> Finished:
     unit = job.unit
     capture = _opened(job.session, unit.ref)
     with_candidates = any(rule.scoring == "peak" for rule in job.rules)
-    found = Pipeline(unit.detector).run(capture, candidates=with_candidates)
+    found = Pipeline(unit.detector).run(capture)
     candidates = found.candidates if with_candidates else None
     header = capture.header
     facts = {
