@@ -249,7 +249,7 @@ def _fused(steps: list[Opened], notes: list[str], threads: int) -> list[Opened]:
         covered, kernel = max(
             ((kind.covers(stages), kind) for kind in kernels), key=lambda found: found[0], default=(0, None)
         )
-        if kernel is None or covered < 2 or _still_wanted(stages[:covered]) & _wanted(stages[covered:]):
+        if kernel is None or covered < 2 or _kept_inside(stages[:covered]) & _wanted(stages[covered:]):
             fused.append(steps[place])
             place += 1
             continue
@@ -259,14 +259,14 @@ def _fused(steps: list[Opened], notes: list[str], threads: int) -> list[Opened]:
     return fused
 
 
-def _still_wanted(stages: list[Stage[Any]]) -> frozenset[str]:
+def _kept_inside(stages: list[Stage[Any]]) -> frozenset[str]:
     """Ports about frames that these stages make, which a kernel keeps to itself."""
     made = frozenset[str]().union(*(stage.produces for stage in stages))
     return made & {"first_path", "noise", "profile"}
 
 
 def _wanted(stages: list[Stage[Any]]) -> frozenset[str]:
-    return frozenset[str]().union(*(stage.consumes for stage in stages))
+    return frozenset[str]().union(*(stage.wanted for stage in stages))
 
 
 def load_detector(

@@ -47,6 +47,11 @@ class SnrScore(Stage[SnrScoreParams]):
     rowwise: ClassVar[bool] = True
     fidelity = "from-source"
 
+    @property
+    def wanted(self) -> frozenset[str]:
+        """The profile too, where amplitudes are scaled as it was."""
+        return self.consumes | ports("profile") if self.params.amplitude == "normalised" else self.consumes
+
     def step(self, block: Block) -> Block:
         """Block whose detections have ``score_db``."""
         row = block.rows

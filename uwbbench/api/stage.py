@@ -53,7 +53,8 @@ class Stage(Generic[P]):
     removes : frozenset of str
         Ports that are gone behind this stage, for example ``frames`` where detections are held back.
     needs : frozenset of str
-        What the capture must have: ``sts``, ``truth`` or a reported ``first_path``.
+        What the capture must have: ``sts``, ``truth`` or a reported ``first_path``. A batch reads STS responses only
+        where a stage needs them.
     rowwise : bool
         True where each detection's new columns depend on that row and its frame alone. Rejected candidates are then
         described in the same way, for scorings that ask what the filters removed.
@@ -77,6 +78,11 @@ class Stage(Generic[P]):
     def params_type(cls) -> type[Params]:
         """Pydantic model of the parameters."""
         return params_type_of(cls, Stage)
+
+    @property
+    def wanted(self) -> frozenset[str]:
+        """Ports that this stage looks at; overridden where some of its parameters make it look at more."""
+        return self.consumes
 
     def open(self, radar: Radar) -> None:
         """Start a stream: set the state that lives between blocks. Overriders call this first."""
