@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
-from typing import Literal, Self
+from typing import TYPE_CHECKING, Any, Literal, Self
 
 import numpy as np
 from pydantic import Field, model_validator
 
 from uwbbench.api import Block, Detections, FloatArray, Frames, IntArray, Params, Radar, Stage, ports
+from uwbbench_detectors.clusters.held import HeldRows
+
+if TYPE_CHECKING:
+    from uwbbench_detectors.clusters.rounds import GrowingRounds, WindowedRounds
 
 NOISE = -1
 
@@ -27,8 +30,8 @@ class DbscanParams(Params):
     window: int | None = Field(
         None,
         ge=1,
-        description="Points that are clustered, counted back from the newest; null takes all so far, at a cost that "
-        "grows with their number. 50 with min_samples 20 leaves room for two clusters.",
+        description="Points that are clustered, counted back from the newest; null takes all so far, which costs no "
+        "more time but memory for each. 50 with min_samples 20 leaves room for two clusters.",
     )
     labels: Literal["causal", "final"] = Field(
         "causal",
@@ -77,100 +80,92 @@ class Dbscan(Stage[DbscanParams]):
     def open(self, radar: Radar) -> None:
         """Start without points."""
         super().open(radar)
-        self._origin_m = np.empty((0, 2))  # the first point, once there is one
-        self._new = 0
-        self._points_m = np.empty((0, 2))
-        self._ids = np.empty(0, np.int64)  # cluster of each point so far; NOISE marks exactly the points held back
-        self._arrived: list[FloatArray] = []
-        self._held: list[Detections] = []
-        self._clusters = 0
+        self._held = HeldRows()
+        self._new = 0  # points held that no re-clustering has seen
+        self._origin_m: FloatArray | None = None  # the first point, once there is one
+        self._rounds = self._start()
+        self._frames: Frames | None = None
+        self._nothing: Detections | None = None
         self.clusterings = 0
-        self._no_frames: Frames | None = None
 
     def step(self, block: Block) -> Block:
         """Block with the detections that are ready, their ``cluster`` filled in."""
         found = block.detections
-        self._no_frames = block.frames.part(len(block.frames), len(block.frames))
-        released = [_labelled(found.take(np.empty(0, np.int64)), NOISE)]
+        self._frames = block.frames
         if self.params.labels == "final":
-            self._held.append(found)
-            return block.replace(detections=released[0])
-        points_m = np.stack([found["x_m"], found["y_m"]], axis=1)
-        located = np.isfinite(points_m).all(axis=1)
-        due = located & ((self._new + np.cumsum(located)) % self.params.every == 0)
-        for start, stop in pairwise([0, *(np.flatnonzero(due) + 1), len(found)]):
-            rows = np.arange(start, stop)
-            released.append(_labelled(found.take(rows[~located[rows]]), NOISE))
-            self._hold(found.take(rows[located[rows]]), points_m[rows[located[rows]]])
-            if self._new == self.params.every:
-                released.append(self._recluster())
-        return block.replace(detections=Detections.join(released))
+            self._held.add(found)
+            return block.replace(detections=self._none_of(found))
+        located = np.isfinite(found["x_m"]) & np.isfinite(found["y_m"])
+        count = int(np.count_nonzero(located))
+        all_located = count == len(found)
+        before = self._new
+        self._held.add(found if all_located else found.take(located))
+        self._new += count
+        due = self._new - self._new % self.params.every
+        if all_located and not due:
+            return block.replace(detections=self._none_of(found))
+        columns, rounds = self._recluster(due)
+        ready = Detections(**columns, processed=found.processed, notes=found.notes)
+        if not all_located:
+            # They come out at once: before what is released by the round that they arrived in.
+            lost_in = ((before + np.cumsum(located)) // self.params.every)[~located]
+            order = np.argsort(np.concatenate([lost_in, rounds]), kind="stable")
+            ready = Detections.join([_with_cluster(found.take(~located), NOISE), ready]).take(order)
+        return block.replace(detections=ready)
 
     def flush(self) -> Block | None:
         """Block without frames that holds all that was held back."""
-        if self._no_frames is None:
+        if self._frames is None:
             return None
+        no_frames = self._frames.part(len(self._frames), len(self._frames))
         if self.params.labels == "final":
-            held = Detections.join(self._held)
-            points_m = np.stack([held["x_m"], held["y_m"]], axis=1)
-            located = np.isfinite(points_m).all(axis=1)
-            clusters = np.full(len(held), NOISE)
-            if located.any():
-                clusters[located], _ = self._dbscan(points_m[located] - points_m[located][0])
-            return Block(self._no_frames, detections=_labelled(held, clusters))
-        clustered = self._recluster() if self._new else Detections.empty()
-        noise = _labelled(Detections.join(self._held), NOISE)
-        return Block(self._no_frames, detections=Detections.join([clustered, noise]))
+            held = Detections(**self._held.release_all(), processed=())
+            return Block(no_frames, detections=held.with_columns(cluster=self._final_clusters(held)))
+        clustered, _ = self._recluster(self._new)
+        noise = _with_cluster(Detections(**self._held.release_all(), processed=()), NOISE)
+        return Block(no_frames, detections=Detections.join([Detections(**clustered, processed=()), noise]))
 
-    def _hold(self, found: Detections, points_m: FloatArray) -> None:
-        if len(found) == 0:
-            return
-        self._origin_m = np.concatenate([self._origin_m, points_m])[:1]
-        self._held.append(found)
-        self._arrived.append(points_m - self._origin_m)  # map coordinates of millions of metres would cost digits
-        self._new += len(points_m)
+    def _start(self) -> GrowingRounds | WindowedRounds:
+        from uwbbench_detectors.clusters.rounds import GrowingRounds, WindowedRounds  # compiled
 
-    def _recluster(self) -> Detections:
-        """Cluster the points in the window, and release what is decided by that."""
-        self.clusterings += 1
-        arrived = np.concatenate(self._arrived)
-        points_m = np.concatenate([self._points_m, arrived])
-        ids = np.concatenate([self._ids, np.full(len(arrived), NOISE)])
-        waiting = ids == NOISE
-        left = len(points_m) - min(len(points_m), self.params.window or len(points_m))
-        labels, core = self._dbscan(points_m[left:])
-        ids[left:] = self._numbered(labels, core, ids[left:])
-        decided = (ids != NOISE) | (np.arange(len(ids)) < left)
+        params = self.params
+        if params.window is None:
+            return GrowingRounds(params.eps_m, params.min_samples, params.every)
+        return WindowedRounds(params.eps_m, params.min_samples, params.every, params.window)
 
-        held = Detections.join(self._held)
-        self._held = [held.take(~decided[waiting])]
-        self._points_m, self._ids = points_m[left:], ids[left:]
-        self._arrived, self._new = [], 0
-        return _labelled(held.take(decided[waiting]), ids[waiting & decided])
+    def _none_of(self, found: Detections) -> Detections:
+        """Detections without rows, prepared once: most calls release nothing."""
+        if self._nothing is None or not found.columns.keys() <= self._nothing.columns.keys():
+            self._nothing = _with_cluster(found.take(np.empty(0, np.int64)), NOISE).annotated(
+                processed=np.empty(0, np.int64)
+            )
+        return self._nothing
 
-    def _dbscan(self, points_m: FloatArray) -> tuple[IntArray, IntArray]:
-        """Labels (n,) and indices of the core points."""
-        from sklearn.cluster import DBSCAN  # takes longer to import than all else together
+    def _recluster(self, count: int) -> tuple[dict[str, Any], IntArray]:
+        """Cluster the first of the new points; columns of what that decides, and the round that did."""
+        if not count:
+            nothing = np.empty(0, np.int64)
+            return {**self._held.release(nothing), "cluster": nothing}, nothing
+        points_m = self._held.points_m(self._new)[:count]
+        if self._origin_m is None:
+            self._origin_m = points_m[0]
+        # Map coordinates of millions of metres would cost digits.
+        decided = self._rounds.extend(points_m - self._origin_m)
+        self._new -= count
+        self.clusterings += -(-count // self.params.every)
+        return {**self._held.release(decided.points), "cluster": decided.clusters}, decided.rounds
 
-        # The tree decides distances that tie with eps as the definition says; brute force does not.
-        model = DBSCAN(eps=self.params.eps_m, min_samples=self.params.min_samples, algorithm="kd_tree").fit(points_m)
-        return np.asarray(model.labels_, dtype=np.int64), np.asarray(model.core_sample_indices_, dtype=np.int64)
+    def _final_clusters(self, held: Detections) -> IntArray:
+        from uwbbench_detectors.clusters.incremental import dbscan  # compiled
 
-    def _numbered(self, labels: IntArray, core: IntArray, ids: IntArray) -> IntArray:
-        """Numbers (n,) that stay the same between re-clusterings; points that are noise now keep theirs.
-
-        Core points alone carry a number on: a border point may lie between two clusters and change sides.
-        """
-        numbered = ids.copy()
-        taken: set[int] = set()
-        for label in range(int(labels.max(initial=NOISE)) + 1):
-            known = set(ids[core[labels[core] == label]].tolist()) - taken - {NOISE}
-            number = min(known, default=self._clusters)
-            self._clusters = max(self._clusters, number + 1)
-            taken.add(number)
-            numbered[labels == label] = number
-        return numbered
+        points_m = np.stack([held["x_m"], held["y_m"]], axis=1)
+        located = np.isfinite(points_m).all(axis=1)
+        clusters = np.full(len(held), NOISE)
+        if located.any():
+            points_m = points_m[located]
+            clusters[located], _ = dbscan(points_m - points_m[0], self.params.eps_m, self.params.min_samples)
+        return clusters
 
 
-def _labelled(found: Detections, cluster: IntArray | int) -> Detections:
-    return found.with_columns(cluster=np.broadcast_to(cluster, len(found)))
+def _with_cluster(found: Detections, number: int) -> Detections:
+    return found.with_columns(cluster=np.full(len(found), number))

@@ -46,7 +46,7 @@ def by_arrival(found: Detections) -> np.ndarray:
 @given(
     seed=st.integers(0, 10_000), points=st.integers(0, 160), min_samples=st.integers(1, 12), every=st.integers(1, 60)
 )
-@settings(max_examples=40)
+@settings(max_examples=40, deadline=None)
 def test_over_all_points_the_clustered_ones_are_those_of_a_single_clustering(
     clustered, seed, points, min_samples, every
 ):
@@ -59,7 +59,7 @@ def test_over_all_points_the_clustered_ones_are_those_of_a_single_clustering(
 
 
 @given(seed=st.integers(0, 10_000), points=st.integers(1, 160), every=st.integers(1, 60))
-@settings(max_examples=30)
+@settings(max_examples=30, deadline=None)
 def test_final_labels_are_those_of_a_single_clustering_in_order_of_arrival(clustered, seed, points, every):
     points_m = scene(seed, points)
     found = clustered(points_m, min_samples=5, every=every, labels="final")
@@ -80,7 +80,7 @@ def test_final_labels_are_those_of_a_single_clustering_in_order_of_arrival(clust
     ),
     cuts=st.lists(st.integers(0, 130), max_size=8),
 )
-@settings(max_examples=40)
+@settings(max_examples=40, deadline=None)
 def test_blocks_do_not_matter(run_cut, make_radar, block_of, seed, params, cuts):
     points_m = scene(seed, 130)
     points_m[::9] = np.nan
@@ -130,7 +130,7 @@ def test_a_cluster_keeps_its_number_and_merging_clusters_take_the_smaller(cluste
 
 
 @given(seed=st.integers(0, 10_000))
-@settings(max_examples=30)
+@settings(max_examples=30, deadline=None)
 def test_growing_scene_never_gives_one_number_to_two_clusters_of_the_end(clustered, seed):
     points_m = scene(seed, 150, objects=6)
     numbers = by_arrival(clustered(points_m, every=10, min_samples=5))
@@ -164,7 +164,7 @@ def test_a_cluster_split_by_the_window_gets_a_second_number(clustered):
 
 
 @given(seed=st.integers(0, 10_000))
-@settings(max_examples=10)
+@settings(max_examples=10, deadline=None)
 def test_map_coordinates_give_the_same_clusters(clustered, seed):
     points_m = np.round(scene(seed, 80) * 1024) / 1024  # exact in binary, also after the shift
     far_m = points_m + np.array([500_000.0, 5_600_000.0])
