@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import json
-import sys
 from collections.abc import Iterator, Mapping
 from functools import cache
 from pathlib import Path
@@ -21,6 +20,7 @@ from uwbbench.api.errors import ConfigError, PluginError
 from uwbbench.api.kernel import Kernel
 from uwbbench.api.stage import Stage
 from uwbbench.config.detector import DetectorConfig, detector_from_text, read_detector
+from uwbbench.sources import source_hash
 from uwbbench.stream import Opened, Stream, without_invalid
 
 BATCH_FRAMES = 4096
@@ -204,11 +204,10 @@ class Pipeline:
     @property
     def identity(self) -> str:
         """SHA-256 over the resolved configuration and the sources of its stages."""
-        sources = {}
-        for step in self.config.steps:
-            module = sys.modules[registry.load("stages", step.use).__module__]
-            content = Path(module.__file__).read_bytes() if module.__file__ else b""
-            sources[step.use] = hashlib.sha256(content).hexdigest()
+        sources = {step.use: source_hash(registry.load("stages", step.use).__module__) for step in self.config.steps}
+        for name in registry.entries("kernels"):
+            with contextlib.suppress(PluginError):  # one that cannot be loaded is not used
+                sources[f"kernel {name}"] = source_hash(registry.load("kernels", name).__module__)
         text = json.dumps({"detector": self.config.to_dict(), "sources": sources}, sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()
 

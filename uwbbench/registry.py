@@ -1,7 +1,7 @@
 """Finding plugins by name, without importing any before one is asked for.
 
-Plugins are entry points of six groups: stages, datasets, metrics, terms and kernels are classes; a detector is a YAML file in a
-package, named ``package.module:file.yaml``. Built-in plugins are registered in the same way.
+Plugins are entry points of six groups: stages, datasets, metrics, terms and kernels are classes; a detector is a YAML
+file in a package, named ``package.module:file.yaml``. Built-in plugins are registered in the same way.
 """
 
 from __future__ import annotations
