@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import ClassVar, Self
 
 import numpy as np
 from pydantic import Field, model_validator
 
-from uwbbench.api import Block, BoolArray, Filter, FloatArray, Params, ports
-
-
-def _within(values: FloatArray, minimum: float | None, maximum: float | None) -> BoolArray:
-    """Mask of the values inside the limits, both inclusive; None sets no limit, and NaN is never inside."""
-    lowest = -np.inf if minimum is None else minimum
-    highest = np.inf if maximum is None else maximum
-    return np.asarray((values >= lowest) & (values <= highest))
+from uwbbench.api import Block, BoolArray, Filter, Params, ports
+from uwbbench.api.filters import Limit, LimitFilter
 
 
 def _check_order(minimum: float | None, maximum: float | None, unit: str) -> None:
@@ -33,15 +28,12 @@ class ProminenceFilterParams(Params):
     )
 
 
-class ProminenceFilter(Filter[ProminenceFilterParams]):
+class ProminenceFilter(LimitFilter[ProminenceFilterParams]):
     """Keep peaks that stand out of their surroundings (arXiv 2512.01018)."""
 
     consumes: ClassVar[frozenset[str]] = ports("detections", "prominence")
+    limits: ClassVar[Mapping[str, Limit]] = {"minimum": Limit("prominence", "least")}
     fidelity = "from-source"
-
-    def keep(self, block: Block) -> BoolArray:
-        """Mask of the detections with enough prominence."""
-        return _within(block.detections["prominence"], self.params.minimum, None)
 
 
 class WidthFilterParams(Params):
@@ -60,15 +52,15 @@ class WidthFilterParams(Params):
         return self
 
 
-class WidthFilter(Filter[WidthFilterParams]):
+class WidthFilter(LimitFilter[WidthFilterParams]):
     """Keep peaks as wide as the pulse (arXiv 2512.01018)."""
 
     consumes: ClassVar[frozenset[str]] = ports("detections", "width_taps")
+    limits: ClassVar[Mapping[str, Limit]] = {
+        "minimum": Limit("width_taps", "least"),
+        "maximum": Limit("width_taps", "most"),
+    }
     fidelity = "from-source"
-
-    def keep(self, block: Block) -> BoolArray:
-        """Mask of the detections whose width lies inside the limits."""
-        return _within(block.detections["width_taps"], self.params.minimum, self.params.maximum)
 
 
 class SnrFilterParams(Params):
@@ -80,15 +72,12 @@ class SnrFilterParams(Params):
     )
 
 
-class SnrFilter(Filter[SnrFilterParams]):
+class SnrFilter(LimitFilter[SnrFilterParams]):
     """Keep detections that stand above the noise (arXiv 2512.01018)."""
 
     consumes: ClassVar[frozenset[str]] = ports("detections", "score_db")
+    limits: ClassVar[Mapping[str, Limit]] = {"minimum_db": Limit("score_db", "least")}
     fidelity = "from-source"
-
-    def keep(self, block: Block) -> BoolArray:
-        """Mask of the detections with enough score."""
-        return _within(block.detections["score_db"], self.params.minimum_db, None)
 
 
 class PdoaFilterParams(Params):
@@ -102,15 +91,12 @@ class PdoaFilterParams(Params):
     )
 
 
-class PdoaFilter(Filter[PdoaFilterParams]):
+class PdoaFilter(LimitFilter[PdoaFilterParams]):
     """Keep detections inside the sector that the antenna pair resolves (arXiv 2512.01018)."""
 
     consumes: ClassVar[frozenset[str]] = ports("detections", "pdoa_rad")
+    limits: ClassVar[Mapping[str, Limit]] = {"maximum_rad": Limit("pdoa_rad", "most", magnitude=True)}
     fidelity = "from-source"
-
-    def keep(self, block: Block) -> BoolArray:
-        """Mask of the detections inside the sector."""
-        return _within(np.abs(block.detections["pdoa_rad"]), None, self.params.maximum_rad)
 
 
 class FirstPathFilterParams(Params):
@@ -150,11 +136,11 @@ class RangeFilterParams(Params):
         return self
 
 
-class RangeFilter(Filter[RangeFilterParams]):
+class RangeFilter(LimitFilter[RangeFilterParams]):
     """Keep detections within a span of ranges."""
 
     consumes: ClassVar[frozenset[str]] = ports("detections", "range_m")
-
-    def keep(self, block: Block) -> BoolArray:
-        """Mask of the detections inside the span."""
-        return _within(block.detections["range_m"], self.params.minimum_m, self.params.maximum_m)
+    limits: ClassVar[Mapping[str, Limit]] = {
+        "minimum_m": Limit("range_m", "least"),
+        "maximum_m": Limit("range_m", "most"),
+    }

@@ -7,10 +7,11 @@ from typing import ClassVar
 import numpy as np
 from pydantic import Field
 
-from uwbbench.api import Block, BoolArray, Filter, FloatArray, IntArray, Params, ports
+from uwbbench.api import Block, BoolArray, Detections, Filter, FloatArray, Params, ports
+from uwbbench.api.filters import RankFilter, RankParams
 
 
-class SelectionParams(Params):
+class SelectionParams(RankParams):
     """How many detections are retained."""
 
     count: int = Field(
@@ -21,20 +22,7 @@ class SelectionParams(Params):
     )
 
 
-def _first_of_each_frame(frame: IntArray, count: int, *keys: FloatArray) -> BoolArray:
-    """Mask of the ``count`` detections of each frame that come first by ``keys``, the most important one first.
-
-    Detections whose first key is NaN cannot be ranked and are not retained.
-    """
-    order = np.lexsort((*reversed(keys), frame))
-    ordered = frame[order]
-    place = np.arange(len(order)) - np.searchsorted(ordered, ordered)
-    retained = np.empty(len(order), bool)
-    retained[order] = place < count
-    return retained & ~np.isnan(keys[0])
-
-
-class Strongest(Filter[SelectionParams]):
+class Strongest(RankFilter[SelectionParams]):
     """Retain the detections of largest amplitude in each frame, the earlier one of equals.
 
     Stands behind the filters, as in arXiv 2512.01018: the strongest of what they left.
@@ -43,20 +31,19 @@ class Strongest(Filter[SelectionParams]):
     consumes: ClassVar[frozenset[str]] = ports("detections", "amplitude", "tap")
     fidelity = "from-source"
 
-    def keep(self, block: Block) -> BoolArray:
-        """Mask of the retained detections."""
-        found = block.detections
-        return _first_of_each_frame(found.frame, self.params.count, -found["amplitude"], found["tap"])
+    def rank(self, found: Detections) -> tuple[FloatArray, ...]:
+        """Falling amplitude, then the tap."""
+        return -found["amplitude"], found["tap"]
 
 
-class Nearest(Filter[SelectionParams]):
+class Nearest(RankFilter[SelectionParams]):
     """Retain the detections of shortest delay in each frame."""
 
     consumes: ClassVar[frozenset[str]] = ports("detections", "tap")
 
-    def keep(self, block: Block) -> BoolArray:
-        """Mask of the retained detections."""
-        return _first_of_each_frame(block.detections.frame, self.params.count, block.detections["tap"])
+    def rank(self, found: Detections) -> tuple[FloatArray, ...]:
+        """The tap."""
+        return (found["tap"],)
 
 
 class AllParams(Params):
