@@ -14,7 +14,9 @@ from pydantic.json_schema import models_json_schema
 from uwbbench import registry
 from uwbbench.api.errors import PluginError
 from uwbbench.config.detector import BY_CHANNEL, DetectorModel, StepModel
+from uwbbench.gate.config import GateModel
 from uwbbench.run.experiment import DatasetUse, ExperimentModel
+from uwbbench.tune.config import TuneModel
 
 Schema = dict[str, Any]
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
@@ -34,6 +36,16 @@ def experiment_schema() -> Schema:
     properties["scoring"] = _or(properties["scoring"], properties["scoring"]["items"])
     properties["latency"] = _or(properties["latency"], {"type": "boolean"})
     return schema
+
+
+def gate_schema() -> Schema:
+    """JSON Schema of a gate file; each dataset's parameters follow from its ``use``."""
+    return _file_schema(GateModel, DatasetUse, "datasets", by_channel=False)
+
+
+def tuning_schema() -> Schema:
+    """JSON Schema of a tuning file; each dataset's parameters follow from its ``use``."""
+    return _file_schema(TuneModel, DatasetUse, "datasets", by_channel=False)
 
 
 def scene_schema() -> Schema:

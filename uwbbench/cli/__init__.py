@@ -15,7 +15,7 @@ from typer.core import TyperGroup
 
 import uwbbench
 from uwbbench.api.errors import UwbbenchError
-from uwbbench.cli import data, evaluate, inspection, plot, runs, simulate, stability
+from uwbbench.cli import data, evaluate, gate, inspection, plot, runs, simulate, stability, time, tune, warmup
 
 USAGE_ERROR, INTERRUPTED = 2, 130
 
@@ -68,7 +68,7 @@ def _start(
     """Benchmark UWB radar detectors: the same captures, the same metrics, speed against error."""
 
 
-for _group in (runs, evaluate, inspection, data, simulate, stability, plot):
+for _group in (runs, evaluate, time, tune, gate, inspection, data, simulate, stability, plot, warmup):
     _group.register(app)
 
 

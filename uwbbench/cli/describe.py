@@ -200,18 +200,26 @@ def receiver_text(receiver: dict[str, Any]) -> dict[str, str]:
 
 
 def checked_file(path: Path) -> str:
-    """Summary of a detector, experiment or scene file that passed all checks.
+    """Summary of a detector, experiment, scene, gate or tuning file that passed all checks.
 
     Raises
     ------
     ConfigError, PluginError
-        If it is wrong, or none of the three.
+        If it is wrong, or none of the five.
     """
     from uwbbench.config.source import open_dataset
+    from uwbbench.gate import read_gate
     from uwbbench.pipeline import load_detector
     from uwbbench.run.experiment import read_experiment
+    from uwbbench.tune import read_tuning
 
     keys = read_yaml(path).data
+    if "tuning" in keys:
+        tuning = read_tuning(path)
+        return f"tuning '{tuning.name}', {len(tuning.tuning)} datasets to tune on, fine"
+    if "head" in keys:
+        gate = read_gate(path)
+        return f"gate '{gate.name}', {len(gate.datasets)} datasets, fine"
     if "pipeline" not in keys and ("detectors" in keys or "datasets" in keys or _extends_experiment(path, keys)):
         experiment = read_experiment(path)
         return f"experiment '{experiment.name}', {len(experiment.detectors)} detectors, fine"
@@ -221,9 +229,13 @@ def checked_file(path: Path) -> str:
     if "terms" in keys or "trajectory" in keys:
         captures = open_dataset("simulated", {"scenes": [str(path.resolve())]}, ()).names()
         return f"scene of {len(captures)} captures, fine"
-    near = [nearest(str(key), ["pipeline", "extends", "detectors", "datasets", "terms"]) for key in keys]
+    first_keys = ["pipeline", "extends", "detectors", "datasets", "terms", "head", "tuning"]
+    near = [nearest(str(key), first_keys) for key in keys if key != "schema"]
     hint = next((text for text in near if text.startswith(" Did")), "")
-    kinds = "a detector ('pipeline' or 'extends'), an experiment ('detectors') nor a scene ('terms')"
+    kinds = (
+        "a detector ('pipeline' or 'extends'), an experiment ('detectors'), a scene ('terms'), a gate ('head') nor a "
+        "tuning ('tuning')"
+    )
     raise ConfigError(f"{path}: neither {kinds}.{hint}")
 
 

@@ -8,7 +8,7 @@ from typing import Literal
 from uwbbench import registry
 from uwbbench.api.errors import ConfigError, PluginError, nearest
 
-Folder = Literal["detectors", "experiments", "scenes"]
+Folder = Literal["detectors", "experiments", "scenes", "gates", "tuning"]
 
 _PACKAGE = Path(__file__).resolve().parent.parent
 
@@ -29,7 +29,7 @@ def find_config(folder: Folder, name: str, relative_to: Path | None = None) -> P
 
     Parameters
     ----------
-    folder : {"detectors", "experiments", "scenes"}
+    folder : {"detectors", "experiments", "scenes", "gates", "tuning"}
         Kind of config.
     name : str
         A path (ends in ``.yaml`` or ``.yml``, or holds a separator), a shipped name, or for detectors a name that a
@@ -61,4 +61,4 @@ def find_config(folder: Folder, name: str, relative_to: Path | None = None) -> P
         return known[name]
     if name in others:
         return registry.detector_file(name)
-    raise ConfigError(f"no {folder[:-1]} named '{name}'.{nearest(name, [*known, *others])}")
+    raise ConfigError(f"no {folder.removesuffix('s')} named '{name}'.{nearest(name, [*known, *others])}")

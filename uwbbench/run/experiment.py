@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import fnmatch
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -246,10 +246,10 @@ def read_experiment(
     if model.set:
         raise ConfigError(f"{source.place(('set',))}: 'set' changes an extended experiment, but 'extends' is missing")
     for index, metric in enumerate(model.metrics):
-        with _standing(source, ("metrics", index)):
+        with standing(source, ("metrics", index)):
             registry.load("metrics", metric)
     if model.latency.enabled and model.latency.reference is not None:
-        with _standing(source, ("latency", "reference")):
+        with standing(source, ("latency", "reference")):
             read_detector(model.latency.reference, path.parent)
     if model.region.max_range_m is not None and model.region.max_range_m <= model.region.min_range_m:
         raise ConfigError(
@@ -259,7 +259,7 @@ def read_experiment(
         name=model.name or path.stem,
         description=model.description,
         detectors=_detectors(model, source, path.parent),
-        datasets=_datasets(model, source, [str(root) for root in data_roots(data_dir, path)]),
+        datasets=dataset_sources(model.datasets, source, [str(root) for root in data_roots(data_dir, path)]),
         scoring=tuple(model.scoring),
         gate_m=model.gate_m,
         region=model.region,
@@ -273,7 +273,7 @@ def read_experiment(
 
 
 @contextmanager
-def _standing(source: YamlFile, at: Path_) -> Iterator[None]:
+def standing(source: YamlFile, at: Path_) -> Iterator[None]:
     """Report what is found wrong inside as standing at ``at``."""
     try:
         yield
@@ -291,7 +291,7 @@ def _extended(source: YamlFile, path: Path, seen: tuple[Path, ...]) -> dict[str,
         return data
     if not isinstance(parent, str):
         raise ConfigError(f"{source.place(('extends',))}: expected the name or path of an experiment, found {parent!r}")
-    with _standing(source, ("extends",)):
+    with standing(source, ("extends",)):
         file = find_config("experiments", parent, path.parent)
     if file.resolve() in seen:
         raise ConfigError(f"{source.place(('extends',))}: experiments extend each other in a circle")
@@ -319,7 +319,7 @@ def _detectors(model: ExperimentModel, source: YamlFile, folder: Path) -> tuple[
     for index, item in enumerate(model.detectors):
         use = item if isinstance(item, DetectorUse) else DetectorUse(use="null" if item is None else item)
         at = ("detectors", index)
-        with _standing(source, at):
+        with standing(source, at):
             config = read_detector(use.use, folder, use.set)
             config = replace(config, name=use.name or config.name)
             Pipeline(config)  # checks that its steps fit together
@@ -331,11 +331,31 @@ def _detectors(model: ExperimentModel, source: YamlFile, folder: Path) -> tuple[
     return tuple(found.values())
 
 
-def _datasets(model: ExperimentModel, source: YamlFile, roots: list[str]) -> tuple[DatasetSource, ...]:
+def dataset_sources(
+    uses: Sequence[DatasetUse], source: YamlFile, roots: list[str], key: str = "datasets"
+) -> tuple[DatasetSource, ...]:
+    """Checked datasets of a file, with distinct labels.
+
+    Parameters
+    ----------
+    uses : sequence of DatasetUse
+        As they stand under ``key``.
+    source : YamlFile
+        The file, for messages.
+    roots : list of str
+        Folders to search.
+    key : str
+        Key of the file.
+
+    Raises
+    ------
+    ConfigError, PluginError
+        If an adapter is unknown, a parameter wrong, or a label given twice.
+    """
     found: list[DatasetSource] = []
-    for index, item in enumerate(model.datasets):
-        at = ("datasets", index)
-        with _standing(source, (*at, "use")):
+    for index, item in enumerate(uses):
+        at = (key, index)
+        with standing(source, (*at, "use")):
             registry.load("datasets", item.use)
         open_dataset(item.use, item.params, [Path(root) for root in roots], source, (*at, "params"))
         same = sum(other.use == item.use for other in found)

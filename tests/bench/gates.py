@@ -1,0 +1,37 @@
+"""What regression gates said of a detector against itself, and of one that is a tenth slower.
+
+Run through ``python tests/bench/run.py gate``; ``bench_gate.py`` is how it is measured.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import bench_gate
+import numpy as np
+from harness import Effort, Interval, Row, at_least, at_most
+
+from uwbbench.gate.check import Verdict
+from uwbbench.stats import clopper_pearson
+
+
+def rows(effort: Effort) -> Iterator[Row]:
+    """All targets of this module."""
+    with bench_gate.bench() as (worker, ref, folder):
+        same = bench_gate.tally(worker, ref, folder, 0.0, effort.gates)
+        title = f"{effort.gates} gates, base against base: share of regressions"
+        yield at_most(title, 0, _share(same), "", _note(same))
+        slower = bench_gate.tally(worker, ref, folder, bench_gate.SLOWDOWN, effort.gates)
+        title = f"{effort.gates} gates, {bench_gate.SLOWDOWN:.0%} slower: share caught"
+        yield at_least(title, 0.95, _share(slower), "", _note(slower))
+
+
+def _share(tally: bench_gate.Tally) -> Interval:
+    """Regressions among the verdicts, with the exact interval of a binomial share."""
+    found, gates = tally.verdicts[Verdict.REGRESSION], tally.verdicts.total()
+    return Interval(found / gates, *clopper_pearson(found, gates))
+
+
+def _note(tally: bench_gate.Tally) -> str:
+    verdicts = ", ".join(f"{count} {verdict}" for verdict, count in tally.verdicts.items())
+    return f"{verdicts}; median ratio {np.median(tally.ratios):.3f}" if tally.ratios else verdicts
