@@ -15,8 +15,8 @@ import numpy as np
 from uwbbench.api.arrays import FloatArray, IntArray
 from uwbbench.api.compiled import compiled
 
-PAIRWISE_MOST = 128
-"""Terms up to which numpy's pairwise sum is eight running sums."""
+FLAT = -2
+"""In place of a tap: the profile has flat tops."""
 
 
 @compiled
@@ -118,6 +118,41 @@ def vertex_shift(amplitude: FloatArray, tap: int, logarithmic: bool) -> tuple[fl
     if not bend < 0:
         return 0.0, close
     return min(max(0.5 * (left - right) / bend, -0.5), 0.5), close
+
+
+@compiled
+def strongest_crest(heights: IntArray, strengths: IntArray, earliest: int, bound: int, bound_place: int) -> int:
+    """Place in the profile of the strongest maximum that is left to examine; -1 for none, or FLAT.
+
+    Where the profile rises to a tap and goes on level anywhere, other functions must tell what is a maximum. All taps
+    are looked at alike, many at once, and without a branch, since which of them are maxima cannot be foretold.
+
+    Parameters
+    ----------
+    heights, strengths : (taps,) int array
+        Bits of the profile and of the magnitudes under it.
+    earliest : int
+        Place from which on maxima count.
+    bound, bound_place : int
+        Strength and place of the one examined before: what is left is weaker, or as strong and later.
+    """
+    last = len(heights) - 1
+    best = np.int64(-1)
+    flat = np.int64(0)
+    for place in range(1, last):
+        rises = heights[place] > heights[place - 1]
+        flat = max(flat, np.int64(1) if rises & (heights[place] == heights[place + 1]) else np.int64(0))
+        crest = rises & (heights[place] > heights[place + 1]) & (place >= earliest)
+        left = (strengths[place] < bound) | ((strengths[place] == bound) & (place > bound_place))
+        best = max(best, strengths[place] if crest & left else np.int64(-1))
+    if flat:
+        return FLAT
+    found = last
+    for place in range(1, last):
+        crest = (heights[place] > heights[place - 1]) & (heights[place] > heights[place + 1]) & (place >= earliest)
+        left = (best < bound) | (place > bound_place)
+        found = min(found, place if crest & left & (strengths[place] == best) else last)
+    return found if found < last else -1
 
 
 @compiled

@@ -17,6 +17,7 @@ from uwbbench.api.arrays import FloatArray, IntArray
 from uwbbench.api.compiled import compiled
 from uwbbench_detectors.fused import layout as at
 from uwbbench_detectors.fused.frame import (
+    FLAT,
     crest_tap,
     find_extremes,
     find_maxima,
@@ -24,6 +25,7 @@ from uwbbench_detectors.fused.frame import (
     median_noise,
     root_mean_square,
     scale_profile,
+    strongest_crest,
     vertex_shift,
 )
 from uwbbench_detectors.fused.place import azimuth_of, phase_difference, position_of, range_of
@@ -37,14 +39,14 @@ NEAR = 1e-9
 
 PASSED, FAILED, UNDECIDED = 0, 1, 2
 UNCLEAR, MORE = -1, -2
+STRONGER_THAN_ALL = np.int64(2**63 - 1)
 
 
 class Signal(NamedTuple):
     """What the search knows of one frame, in numbers; arrays are handed on by themselves, which costs less."""
 
     row: int
-    count: int
-    guarded: int
+    earliest: int
     first_path: float
     noise: float
     noise_log: float
@@ -89,16 +91,6 @@ def _first_path(
 
 
 @compiled
-def _guarded(peaks: IntArray, count: int, earliest: float, near: float) -> int:
-    """Number of peaks before the guard; UNCLEAR where one lies so near to it that rounding could decide."""
-    guarded = close = 0
-    for place in range(count):
-        guarded += peaks[place] <= earliest
-        close += abs(peaks[place] - earliest) < near
-    return UNCLEAR if close else guarded
-
-
-@compiled
 def _examine(
     amplitude: FloatArray,
     profile: FloatArray,
@@ -115,7 +107,7 @@ def _examine(
     ``row`` holds its prominence already, or NaN where that is not known.
     """
     if math.isnan(row[at.PROMINENCE]):
-        row[at.PROMINENCE] = prominence_of(profile, place, limits[at.LEAST_PROMINENCE])
+        row[at.PROMINENCE] = prominence_of(profile, place)
     if not row[at.PROMINENCE] >= limits[at.LEAST_PROMINENCE]:
         return FAILED
     row[at.WIDTH] = width_of(profile, place, row[at.PROMINENCE], limits[at.RELATIVE_HEIGHT])
@@ -145,20 +137,6 @@ def _examine(
 
 
 @compiled
-def _strongest_below(amplitude: FloatArray, peaks: IntArray, start: int, signal: Signal, bound: int) -> int:
-    """Place of the strongest peak weaker than that at ``bound``, or as strong and later; -1 for none."""
-    best = -1
-    height = -1.0
-    limit = np.inf if bound < 0 else amplitude[bound + start]
-    for number in range(signal.guarded, signal.count):  # without a branch: which is strongest cannot be foretold
-        place = peaks[number]
-        strength = amplitude[place + start]
-        better = (strength > height) & ((strength < limit) | ((strength == limit) & (place > bound)))
-        best, height = (place if better else best), (strength if better else height)
-    return best
-
-
-@compiled
 def _examine_by_strength(
     amplitude: FloatArray,
     profile: FloatArray,
@@ -167,25 +145,28 @@ def _examine_by_strength(
     how: IntArray,
     limits: FloatArray,
     signal: Signal,
-    peaks: IntArray,
+    heights: IntArray,
+    strengths: IntArray,
     passed: FloatArray,
 ) -> int:
     """Keep the strongest peak that passes: how many do, UNCLEAR where rounding could decide, or MORE after many."""
-    start = how[at.PROFILE_START]
     row = passed[0]
     weakest = signal.noise * limits[at.LEAST_RATIO]
-    best = -1
+    bound, best = STRONGER_THAN_ALL, -1
     for _ in range(TRIED_SINGLY):
-        best = _strongest_below(amplitude, peaks, start, signal, best)
+        best = strongest_crest(heights, strengths, signal.earliest, bound, best)
+        if best == FLAT:
+            return MORE
         # No peak is more prominent than it is high, and those left are no higher.
         if best < 0 or not profile[best] >= limits[at.LEAST_PROMINENCE]:
             return 0
-        if amplitude[best + start] < weakest:
+        if amplitude[best + how[at.PROFILE_START]] < weakest:
             return 0
         row[at.PROMINENCE] = np.nan
         verdict = _examine(amplitude, profile, responses1, responses2, how, limits, signal, best, row)
         if verdict != FAILED:
             return 1 if verdict == PASSED else UNCLEAR
+        bound = strengths[best]
     return MORE
 
 
@@ -198,16 +179,20 @@ def _examine_all(
     how: IntArray,
     limits: FloatArray,
     signal: Signal,
-    peaks: IntArray,
+    marked: Any,
+    places: IntArray,
     passed: FloatArray,
     single: bool,
 ) -> int:
     """Keep the peaks that pass, by rising tap, or the strongest: how many, or UNCLEAR where rounding could decide."""
     start = how[at.PROFILE_START]
-    prominence = prominences_of(profile, peaks[: signal.count])
+    peaks = places[: find_maxima(profile, marked, places)]
+    prominence = prominences_of(profile, peaks)
     kept = 0
-    for number in range(signal.guarded, signal.count):
+    for number in range(len(peaks)):
         place = peaks[number]
+        if place < signal.earliest:
+            continue
         if single and kept and not amplitude[place + start] > passed[0, at.AMPLITUDE]:
             continue
         passed[kept, at.PROMINENCE] = prominence[number]
@@ -320,7 +305,8 @@ def search(
     taps = samples.shape[1]
     amplitude, ends = np.empty(taps), np.empty(2)
     profile = amplitude[start:] if how[at.PROFILE] == at.PROFILE_AMPLITUDE else np.empty(taps - start)
-    marked, peaks = np.empty(taps, np.uint8), np.empty(taps, np.int64)
+    heights, strengths = profile.view(np.int64), amplitude[start:].view(np.int64)
+    marked, places = np.empty(taps, np.uint8), np.empty(taps, np.int64)
     passed = np.empty((2 if single else taps // 2 + 1, len(at.COLUMNS)))
     retained = np.empty(len(passed), np.uint8)
     frame = table.view(np.int64)
@@ -342,31 +328,40 @@ def search(
         if scaled and regular and not scale_profile(amplitude, start, ends[0], ends[1], profile):
             continue
         first_path, close = _first_path(amplitude, given, row, how, limits)
-        regular = regular and not close and math.isfinite(first_path)
-        count = find_maxima(profile, marked, peaks) if regular else 0
-        guarded = _guarded(peaks, count, first_path + limits[at.GUARD_TAPS] - start, near)
-        if regular and guarded == count:
-            continue
+        guarded = first_path + limits[at.GUARD_TAPS]
+        close |= abs(guarded - np.rint(guarded)) < near
         noise = _noise(amplitude, how) if how[at.SCORED] else 1.0
         kept = UNCLEAR
-        if regular and guarded != UNCLEAR and noise > 0:
+        if regular and not close and math.isfinite(first_path) and noise > 0:
+            earliest = math.floor(max(guarded, -1.0)) + 1 - start
             paths = (path[row], path1[row], path2[row]) if how[at.ALIGNED] else (0.0, 0.0, 0.0)
-            signal = Signal(row, count, guarded, first_path, noise, math.log10(noise), paths[0], paths[1], paths[2])
-            kept = (
-                _examine_by_strength(amplitude, profile, responses1, responses2, how, limits, signal, peaks, passed)
-                if single
-                else MORE
-            )
+            signal = Signal(row, earliest, first_path, noise, math.log10(noise), paths[0], paths[1], paths[2])
+            kept = MORE
+            if single:
+                kept = _examine_by_strength(
+                    amplitude, profile, responses1, responses2, how, limits, signal, heights, strengths, passed
+                )
             if kept == MORE:
                 kept = _examine_all(
-                    amplitude, profile, responses1, responses2, how, limits, signal, peaks, passed, single
+                    amplitude,
+                    profile,
+                    responses1,
+                    responses2,
+                    how,
+                    limits,
+                    signal,
+                    marked,
+                    places,
+                    passed,
+                    single,
                 )
         if kept == UNCLEAR:
             irregular[row], clear = True, False
             continue
-        _retain(passed, kept, how, retained)
+        if not single:
+            _retain(passed, kept, how, retained)
         for number in range(kept):
-            if retained[number]:
+            if single or retained[number]:
                 _finish(passed[number], amplitude, first_path, robot_m, yaw_rad, row, how, limits)
                 frame[found, 0] = first + row
                 for column in range(len(order)):

@@ -9,19 +9,14 @@ from uwbbench.api.compiled import compiled
 
 
 @compiled
-def prominence_of(profile: FloatArray, tap: int, least: float) -> float:
-    """Prominence of one peak, found by looking to both sides until something higher.
-
-    Where the left side alone says that it is below ``least``, what is returned is too.
-    """
+def prominence_of(profile: FloatArray, tap: int) -> float:
+    """Prominence of one peak, found by looking to both sides until something higher."""
     height = profile[tap]
     left = right = height
     at = tap - 1
     while at >= 0 and profile[at] <= height:
         left = min(left, profile[at])
         at -= 1
-    if height - left < least:
-        return float(height - left)
     at = tap + 1
     while at < len(profile) and profile[at] <= height:
         right = min(right, profile[at])

@@ -30,7 +30,7 @@ def test_maxima_prominences_and_widths_are_those_of_scipy(values):
     widths, *_ = signal.peak_widths(profile, peaks, 0.5, prominence_data=bases)
     np.testing.assert_array_equal(prominences_of(profile, peaks), bases[0])
     for peak, prominence, width in zip(peaks, bases[0], widths, strict=True):
-        assert prominence_of(profile, peak, 0.0) == prominence
+        assert prominence_of(profile, peak) == prominence
         np.testing.assert_allclose(width_of(profile, peak, prominence, 0.5), width, rtol=0, atol=1e-12)
 
 
