@@ -135,7 +135,7 @@ class Dbscan(Stage[DbscanParams]):
 
     def _none_of(self, found: Detections) -> Detections:
         """Detections without rows, prepared once: most calls release nothing."""
-        if self._nothing is None or not found.columns.keys() <= self._nothing.columns.keys():
+        if self._nothing is None or self._nothing.names != (*found.names, "cluster"):
             self._nothing = _with_cluster(found.take(np.empty(0, np.int64)), NOISE).annotated(
                 processed=np.empty(0, np.int64)
             )

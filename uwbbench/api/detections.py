@@ -120,6 +120,21 @@ class Detections:
         return self._columns
 
     @property
+    def names(self) -> tuple[str, ...]:
+        """Names of all columns, ``frame`` first."""
+        return ("frame", *self._columns[0]) if isinstance(self._columns, tuple) else tuple(self._columns)
+
+    @property
+    def table(self) -> FloatArray:
+        """All columns as one array (n, columns), whole numbers by their bits; not to be changed."""
+        if isinstance(self._columns, tuple):
+            return self._columns[1]
+        made = np.empty((len(self), len(self._columns)))
+        for place, values in enumerate(self._columns.values()):
+            made[:, place] = values.view(np.float64)
+        return made
+
+    @property
     def processed(self) -> IntArray:
         """Indices of all frames that a detector has looked at (m,)."""
         if isinstance(self._processed, tuple):
@@ -157,6 +172,8 @@ class Detections:
 
     def __getitem__(self, column: str) -> NDArray[Any]:
         """Column by name; NaN throughout where nobody computed it."""
+        if isinstance(self._columns, tuple) and column in self._columns[0]:
+            return self._columns[1][:, 1 + self._columns[0].index(column)]
         found = self.columns.get(column)
         return np.full(len(self), np.nan) if found is None else found
 

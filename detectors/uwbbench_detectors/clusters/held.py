@@ -18,7 +18,7 @@ class HeldRows:
     """
 
     def __init__(self) -> None:
-        self._columns: dict[str, int] = {"frame": 0}  # places of the columns in the table
+        self._names: tuple[str, ...] = ("frame",)  # of the columns of the table
         self._rows = np.empty((0, 1))  # frames are whole numbers, whose bits are kept
         self._places = np.empty(0, np.int64)  # known beyond the rows in use: the next ones in order
         self._released = np.empty(0, np.bool_)
@@ -26,40 +26,36 @@ class HeldRows:
 
     def add(self, found: Detections) -> None:
         """Take in rows; a column that only some of them have is NaN in the others."""
-        columns = found.columns
-        if columns.keys() != self._columns.keys():
-            columns = self._completed(found)
+        if found.names != self._names:
+            found = self._completed(found)
         if self._used + len(found) > len(self._places):
             self._make_room(len(found))
         start, stop = self._used, self._used + len(found)
-        values = [columns[name] for name in self._columns]
-        values[0] = values[0].view(np.float64)
-        self._rows[start:stop] = np.concatenate(values).reshape(len(values), len(found)).T
+        self._rows[start:stop] = found.table
         self._used = stop
 
     def points_m(self, count: int) -> FloatArray:
         """Positions (count, 2) of the newest rows."""
-        return self._rows[self._used - count : self._used, [self._columns["x_m"], self._columns["y_m"]]]
+        return self._rows[self._used - count : self._used, [self._names.index("x_m"), self._names.index("y_m")]]
 
     def release(self, places: IntArray) -> dict[str, Any]:
         """Return columns of the rows that arrived at these places, and hold them no longer."""
         rows = np.searchsorted(self._places[: self._used], places)
         self._released[rows] = True
         table = self._rows[rows]
-        columns: dict[str, NDArray[Any]] = dict(zip(self._columns, table.T, strict=True))
+        columns: dict[str, NDArray[Any]] = dict(zip(self._names, table.T, strict=True))
         return columns | {"frame": columns["frame"].view(np.int64)}
 
     def release_all(self) -> dict[str, Any]:
         """Return columns of all rows that are held, in their order of arrival, and hold none."""
         return self.release(self._places[: self._used][~self._released[: self._used]])
 
-    def _completed(self, found: Detections) -> dict[str, NDArray[Any]]:
-        """Columns of rows with all that others have; theirs that are new get a place in the table."""
-        columns = {name: column for name, column in found.columns.items() if name != "cluster"}
-        new = [name for name in columns if name not in self._columns]
-        self._columns |= {name: place for place, name in enumerate(new, start=len(self._columns))}
+    def _completed(self, found: Detections) -> Detections:
+        """Rows with all columns that others have, in their order; columns that are new get a place in the table."""
+        new = [name for name in found.names if name not in (*self._names, "cluster")]
+        self._names = (*self._names, *new)
         self._rows = np.concatenate([self._rows, np.full((len(self._rows), len(new)), np.nan)], axis=1)
-        return {name: np.full(len(found), np.nan) for name in self._columns} | columns
+        return Detections(found.frame, processed=(), **{name: found[name] for name in self._names[1:]})
 
     def _make_room(self, count: int) -> None:
         """Drop the released rows, and have room for so many more, and for as many as are held."""
@@ -68,7 +64,7 @@ class HeldRows:
         arrived = self._places[self._used - 1] + 1 if self._used else 0
         places = np.arange(arrived - len(held), arrived - len(held) + size)
         places[: len(held)] = self._places[held]
-        rows = np.empty((size, len(self._columns)))
+        rows = np.empty((size, len(self._names)))
         rows[: len(held)] = self._rows[held]
         self._rows, self._places, self._released = rows, places, np.zeros(size, np.bool_)
         self._used = len(held)

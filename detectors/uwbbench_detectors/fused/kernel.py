@@ -150,7 +150,7 @@ class FrameSearch(Kernel):
     ) -> Detections:
         """Detections with those of irregular frames, which the stages themselves search one by one."""
         parts = [found]
-        for row in np.flatnonzero(irregular):
+        for row in np.flatnonzero(irregular).tolist():
             path = None if first_path is None else first_path[row : row + 1]
             block = Block(frames.part(row, row + 1), first_path=path)
             for stage in self._plain:
