@@ -1,5 +1,6 @@
 """What the operating system counts."""
 
+import mmap
 import os
 import subprocess
 import sys
@@ -17,8 +18,11 @@ linux = pytest.mark.skipif(sys.platform != "linux", reason="perf_event_open is o
 
 @linux
 def test_page_faults_are_counted_of_the_work_alone() -> None:
-    pages = 3000
-    touched, reason = counted(lambda: np.ones(pages * 4096, np.uint8), counters.SOFTWARE, counters.PAGE_FAULTS)
+    def touch_new_memory() -> None:
+        with mmap.mmap(-1, 3000 * mmap.PAGESIZE) as memory:
+            memory[:: mmap.PAGESIZE] = bytes(3000)
+
+    touched, reason = counted(touch_new_memory, counters.SOFTWARE, counters.PAGE_FAULTS)
     if touched is None:
         pytest.skip(reason)
     idle, _ = counted(lambda: None, counters.SOFTWARE, counters.PAGE_FAULTS)
