@@ -1,6 +1,7 @@
 """The fixture that times a detector with pytest-benchmark."""
 
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -33,7 +34,8 @@ def test_mistake(detector_benchmark, capture):
 def run_pytest(folder: Path, *words: str) -> str:
     (folder / "test_speed.py").write_text(TESTS)
     command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-p", "no:xdist", "-rs", *words]
-    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+    alone = {key: value for key, value in os.environ.items() if not key.startswith("PYTEST_XDIST")}
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False, env=alone)
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout
 
