@@ -17,13 +17,17 @@ from uwbbench.stats import clopper_pearson
 
 def rows(effort: Effort) -> Iterator[Row]:
     """All targets of this module."""
+    gates = effort.gates
     with bench_gate.bench() as (worker, ref, folder):
-        same = bench_gate.tally(worker, ref, folder, 0.0, effort.gates)
-        title = f"{effort.gates} gates, base against base: share of regressions"
-        yield at_most(title, 0, _share(same), "", _note(same))
-        slower = bench_gate.tally(worker, ref, folder, bench_gate.SLOWDOWN, effort.gates)
-        title = f"{effort.gates} gates, {bench_gate.SLOWDOWN:.0%} slower: share caught"
-        yield at_least(title, 0.95, _share(slower), "", _note(slower))
+        for detector in bench_gate.DETECTORS:
+            pair = bench_gate.slowed(worker, ref, folder, detector)
+            same = bench_gate.tally(worker, ref, pair.base, pair.base, gates)
+            title = f"{gates} gates of {detector}, base against base: share of regressions"
+            yield at_most(title, 0, _share(same), "", _note(same))
+            slower = bench_gate.tally(worker, ref, pair.base, pair.head, gates)
+            title = f"{gates} gates of {detector}, {bench_gate.SLOWDOWN:.0%} slower: share caught"
+            made = f"made slower by {pair.ratio.value - 1:.1%}" + ("" if pair.near else ", NOT what was asked for")
+            yield at_least(title, 0.95, _share(slower), "", f"{made}; {_note(slower)}")
 
 
 def _share(tally: bench_gate.Tally) -> Interval:

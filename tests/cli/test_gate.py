@@ -9,6 +9,8 @@ import pytest
 import waiting
 
 from uwbbench import registry
+from uwbbench.api import write_capture
+from uwbbench.config.source import open_dataset
 from uwbbench.run import run_experiment
 from uwbbench.run.experiment import read_experiment
 
@@ -52,6 +54,15 @@ def stored_run(tmp_path: Path) -> Path:
     return run_experiment(read_experiment(file), tmp_path / "stored", jobs=1).path
 
 
+@pytest.fixture(scope="session")
+def capture_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The gate's simulated capture as a file, which need not be simulated again in every worker."""
+    dataset = open_dataset("approach", {}, [])
+    path = tmp_path_factory.mktemp("capture") / "plate.h5"
+    write_capture(path, dataset.open(dataset.names()[0]))
+    return path
+
+
 def verdicts(told: dict) -> list[str]:
     return [check["verdict"] for check in told["checks"]]
 
@@ -59,7 +70,7 @@ def verdicts(told: dict) -> list[str]:
 def test_a_gate_that_holds_is_exit_code_0_and_is_told_for_people(uwbbench, make_gate) -> None:
     make_gate(
         accuracy="[{metric: f1, scoring: frame, minimum: 0.5}, {metric: mae, scoring: object, maximum: 1.0}]",
-        deadline="{rate_hz: 1, paced: false, frames: 400}",
+        deadline="{rate_hz: 1, paced: false, frames: 400, patience: 1, warmup_windows: 2}",
     )
     done = uwbbench("gate", "gate.yaml")
     for text in ("F1 (frame scoring, filtering) on plate, SIMULATED", "missed 0.00 % [0.00 %, 0.92 %], 400 frames"):
@@ -83,26 +94,50 @@ def test_a_limit_that_is_missed_is_exit_code_1_with_files_for_ci(uwbbench, make_
     assert lines[:2] == ["before", "## Gate strict\\|&lt;b&gt;: REGRESSION"]
 
 
-def test_a_head_that_is_much_slower_is_caught_and_a_faster_one_passes(uwbbench, make_gate, stages, tmp_path) -> None:
-    waiting.slowed(tmp_path / "slow.yaml", 200.0, "null")
-    make_gate(latency=ONCE, base="'null'", head="slow.yaml")
+def test_a_head_that_is_much_slower_is_caught_and_a_faster_one_passes(
+    uwbbench, make_gate, stages, capture_file, tmp_path
+) -> None:
+    waiting.slowed(tmp_path / "slow.yaml", 50.0, "null")
+    on_file = {"latency": ONCE, "datasets": None, "captures": f"['{capture_file}']"}
+    make_gate(base="'null'", head="slow.yaml", **on_file)
     told = json.loads(uwbbench("gate", "gate.yaml", "--json", code=1).stdout)
     assert verdicts(told) == ["pass", "regression"]
     assert told["checks"][1]["low"] > 3
     assert told["checks"][1]["n"] == 31
-    make_gate(latency=ONCE, base="slow.yaml", head="null")
+    make_gate(base="slow.yaml", head="null", **on_file)
     told = json.loads(uwbbench("gate", "gate.yaml", "--json").stdout)
     assert told["checks"][1]["high"] < 0.5
 
 
-def test_two_environments_take_turns_in_fresh_pairs_of_processes(uwbbench, make_gate, tmp_path) -> None:
+@pytest.mark.slow
+def test_two_environments_take_turns_in_fresh_pairs_of_processes(uwbbench, make_gate, capture_file, tmp_path) -> None:
     (tmp_path / "base").symlink_to(Path(sys.executable).parent.parent)
     python = f"base/bin/{Path(sys.executable).name}"
-    make_gate(latency=ONCE, base=f"{{python: {python}, detector: paper-filtering}}")
+    captures = f"['{capture_file}']"
+    make_gate(
+        latency=ONCE, datasets=None, captures=captures, head="null", base=f"{{python: {python}, detector: 'null'}}"
+    )
     told = json.loads(uwbbench("gate", "gate.yaml", "--json").stdout)
     assert verdicts(told) == ["pass", "pass"]
     assert [(check["n"], check["counted"]) for check in told["checks"]] == [(3, "processes")] * 2
     assert python in told["base"]
+
+
+def test_a_base_that_differs_from_itself_is_exit_code_3_and_the_head_is_not_measured(
+    uwbbench, make_gate, stages, capture_file, tmp_path
+) -> None:
+    waiting.with_stage(tmp_path / "uneven.yaml", "test.uneven", {"wait_us": 200.0}, "null")
+    make_gate(latency=ONCE, base="uneven.yaml", head="null", datasets=None, captures=f"['{capture_file}']")
+    told = json.loads(uwbbench("gate", "gate.yaml", "--json", code=3).stdout)
+    canary, head = told["checks"]
+    assert (canary["kind"], canary["verdict"], canary["reason"]) == (
+        "canary",
+        "invalid",
+        "the same detector differs from itself",
+    )
+    assert canary["high"] < 1 / 3
+    assert (head["verdict"], head["value"]) == ("invalid", None)
+    assert "not measured" in head["reason"]
 
 
 def test_too_few_frames_are_inconclusive_and_exit_code_2(uwbbench, make_gate, capture) -> None:
@@ -114,7 +149,7 @@ def test_too_few_frames_are_inconclusive_and_exit_code_2(uwbbench, make_gate, ca
 
 def test_missed_deadlines_are_counted_with_bursts(uwbbench, make_gate, stages, tmp_path) -> None:
     waiting.slowed(tmp_path / "slow.yaml", 2000.0)
-    make_gate(head="slow.yaml", deadline="{rate_hz: 1000, maximum_burst: 3, frames: 60}")
+    make_gate(head="slow.yaml", deadline="{rate_hz: 1000, maximum_burst: 3, frames: 60, warmup_windows: 2}")
     told = json.loads(uwbbench("gate", "gate.yaml", "--json", code=1).stdout)
     share, burst = told["checks"]
     assert (share["verdict"], burst["verdict"]) == ("regression", "regression")
@@ -201,7 +236,11 @@ def test_validate_and_schema_know_gates(uwbbench, make_gate) -> None:
 
 def test_a_capture_without_truth_can_be_timed_and_not_scored(uwbbench, make_gate, capture_without_truth) -> None:
     captures = f"[{capture_without_truth.name}]"
-    make_gate(datasets=None, captures=captures, deadline="{rate_hz: 1, paced: false, frames: 400}")
+    make_gate(
+        datasets=None,
+        captures=captures,
+        deadline="{rate_hz: 1, paced: false, frames: 400, patience: 1, warmup_windows: 2}",
+    )
     uwbbench("gate", "gate.yaml")
     make_gate(datasets=None, captures=captures, accuracy="[{metric: f1, scoring: frame, minimum: 0.5}]")
     assert "has no ground truth" in uwbbench("gate", "gate.yaml", code=3).stdout

@@ -40,6 +40,13 @@ def test_a_mistake_is_told_and_the_worker_goes_on(capture_file, side, tmp_path) 
         assert join(worker, "a", side, CaptureRef.of_file(capture_file), 100, 2)["frames"] == 100
 
 
+def test_a_mistake_in_another_environment_names_it(capture_file, tmp_path) -> None:
+    said = (f'{{"protocol": {PROTOCOL}}}', '{"error": "no such detector"}')
+    python = interpreter(tmp_path / "python", "\n".join(f"print({line!r}, flush=True)\ninput()" for line in said))
+    with Worker(python, 5.0) as worker, pytest.raises(SetUpError, match="/python: no such detector"):
+        join(worker, "a", Side("head", "nothing", {}, python), CaptureRef.of_file(capture_file), 100, 2)
+
+
 def test_a_missing_interpreter_is_named(tmp_path) -> None:
     with pytest.raises(SetUpError, match=r"bin/python: no Python interpreter to run: No such file"):
         Worker(tmp_path / "bin/python", 5.0)

@@ -1,6 +1,7 @@
 """Verdicts, exit codes, and what CI is shown."""
 
 import datetime
+import re
 from xml.etree import ElementTree as ET
 
 import pytest
@@ -36,25 +37,60 @@ def test_the_gravest_verdict_is_the_gates_and_has_its_own_exit_code(verdicts, gr
     assert found.verdict.exit_code == found.to_dict()["exit_code"] == code
 
 
-def test_junit_has_the_shape_that_readers_expect() -> None:
-    root = ET.fromstring(junit(result(*Verdict)))  # noqa: S314 - our own text
+ATTRIBUTES = {
+    "testsuites": set(),
+    "testsuite": {
+        *("id", "package", "name", "timestamp", "hostname"),
+        *("tests", "failures", "errors", "skipped", "time"),
+    },
+    "properties": set(),
+    "property": {"name", "value"},
+    "testcase": {"classname", "name", "time"},
+    "failure": {"message", "type"},
+    "error": {"message", "type"},
+    "system-out": set(),
+    "system-err": set(),
+}
+"""Attributes that the schemas of Ant and Jenkins both allow, all of those that Ant's requires among them."""
+
+CHILDREN = {
+    "testsuites": r"(testsuite )*",
+    "testsuite": r"properties (testcase )*system-out system-err ",
+    "properties": r"(property )*",
+    "testcase": r"((failure|error) )?",
+}
+"""Order of children that both allow."""
+
+
+def assert_junit(root: ET.Element) -> None:
+    """Hold a document against the schemas: elements, their order, their attributes, and the types of these."""
     assert root.tag == "testsuites"
-    (suite,) = root
-    counts = {name: suite.get(name) for name in ("tests", "failures", "errors", "skipped")}
-    assert counts == {"tests": "4", "failures": "1", "errors": "1", "skipped": "1"}
-    for name in ("id", "package", "name", "hostname"):
-        assert suite.get(name)
-    assert datetime.datetime.fromisoformat(suite.get("timestamp"))
-    assert [child.tag for child in suite] == ["properties", *["testcase"] * 4, "system-out", "system-err"]
-    assert float(suite.get("time")) == 6.0
-    outcomes = []
-    for case in suite.findall("testcase"):
-        assert case.get("name")
-        assert case.get("classname")
-        assert float(case.get("time")) == 1.5
-        outcomes.append([child.tag for child in case])
-        assert all(child.get("type") for child in case if child.tag != "skipped")
-    assert outcomes == [[], ["failure"], ["skipped"], ["error"]]
+    for element in root.iter():
+        assert set(element.attrib) == ATTRIBUTES[element.tag]
+        assert re.fullmatch(CHILDREN.get(element.tag, ""), "".join(f"{child.tag} " for child in element))
+    assert [suite.get("id") for suite in root] == [str(number) for number in range(len(root))]
+    for suite in root:
+        assert re.fullmatch(r"\d{4}(-\d\d){2}T\d\d(:\d\d){2}", suite.get("timestamp"))  # no zone, no fractions
+        datetime.datetime.fromisoformat(suite.get("timestamp"))
+        counted = {"tests": "testcase", "failures": "testcase/failure", "errors": "testcase/error"}
+        for name, path in counted.items():
+            assert suite.get(name) == str(len(suite.findall(path)))
+        assert suite.get("skipped") == "0"
+        for element in (suite, *suite.findall("testcase")):
+            assert re.fullmatch(r"\d+\.\d{3}", element.get("time"))
+        assert all(suite.get(name) for name in ("package", "name", "hostname"))
+
+
+@given(st.lists(st.sampled_from(Verdict), max_size=6), st.text())
+def test_junit_keeps_to_the_common_schemas(verdicts, name: str) -> None:
+    assert_junit(ET.fromstring(junit(result(*verdicts, text=f"a{name}"))))  # noqa: S314 - our own text
+
+
+def test_each_verdict_has_its_outcome_in_junit_and_only_a_pass_is_green() -> None:
+    root = ET.fromstring(junit(result(*Verdict)))  # noqa: S314
+    found = [[(child.tag, child.get("type")) for child in case] for case in root.iter("testcase")]
+    assert found == [[], [("failure", "regression")], [("error", "inconclusive")], [("error", "invalid")]]
+    assert float(root[0].get("time")) == 6.0
 
 
 def test_hostile_names_are_shown_as_they_are_in_xml_and_break_nothing() -> None:

@@ -11,7 +11,7 @@ from hypothesis.extra.numpy import arrays
 from scipy.stats import binom
 
 from uwbbench.gate.check import Verdict
-from uwbbench.gate.ratio import Ratio, canary, compared, log_ratio
+from uwbbench.gate.ratio import Ratio, canary, compared, log_ratios
 
 LIMIT = 1.05
 samples = arrays(np.float64, st.integers(31, 80), elements=st.floats(-0.5, 0.5))
@@ -25,11 +25,11 @@ def noisy(ratio: float, seed: int, spread: float = 0.02, interrupted: float = 0.
         disturbance = rng.choice([-1.0, 1.0]) * rng.exponential(0.5) if rng.random() < interrupted else 0.0
         return math.log(ratio) + rng.normal(0, spread) + disturbance
 
-    return sample
+    return lambda count: [sample() for _ in range(count)]
 
 
-def rule(sample, minimum: int = 31, patience: int = 4) -> Verdict:
-    return compared(sample, minimum=minimum, patience=patience, limit=LIMIT)[1]
+def rule(sampler, minimum: int = 31, patience: int = 4) -> Verdict:
+    return compared(sampler, minimum=minimum, patience=patience, limit=LIMIT)[1]
 
 
 def test_equal_detectors_raise_no_alarm_and_ten_per_cent_are_caught() -> None:
@@ -95,7 +95,7 @@ def test_the_interval_is_that_of_the_exact_distribution_of_resampled_medians() -
         assert logs[exact - 1] <= math.log(end) <= logs[exact + 1]
 
 
-def test_a_block_is_abba_and_forgives_one_interrupted_turn_of_each() -> None:
+def test_blocks_are_abba_and_baab_and_forgive_one_interrupted_turn_of_each() -> None:
     order: list[str] = []
     base, head = itertools.cycle([9.0, 1.0]), itertools.cycle([2.0, 30.0])
 
@@ -103,6 +103,6 @@ def test_a_block_is_abba_and_forgives_one_interrupted_turn_of_each() -> None:
         order.append(name)
         return next(times)
 
-    found = log_ratio(lambda: turn("A", base), lambda: turn("B", head))
-    assert order == ["A", "B", "B", "A"]
-    assert math.isclose(found, math.log(2.0))
+    found = log_ratios(lambda: turn("A", base), lambda: turn("B", head), 3)
+    assert "".join(order) == "ABBA" + "BAAB" + "ABBA"
+    assert found == pytest.approx([math.log(2.0)] * 3)

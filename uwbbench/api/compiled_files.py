@@ -34,6 +34,7 @@ from typing import Any
 import numba
 import numpy as np
 from numba.core.caching import CompileResultCacheImpl, FunctionCache, _CacheLocator
+from numba.core.extending import _Intrinsic
 from numba.core.serialize import dumps
 from numba.extending import is_jitted
 
@@ -198,6 +199,8 @@ def _origins(function: Callable[..., object]) -> set[bytes]:
         for name, value in _read_by(here):
             if is_jitted(value):
                 pending.append(value.py_func)
+            elif isinstance(value, _Intrinsic):
+                found.add(Path(inspect.getfile(value._defn)).read_bytes())
             elif isinstance(value, np.ndarray):
                 found.add(f"{name} {value.dtype} {value.shape} ".encode() + value.tobytes())
             elif isinstance(value, bool | int | float | complex | str | tuple | np.generic):

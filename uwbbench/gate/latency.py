@@ -7,7 +7,7 @@ time.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
@@ -17,7 +17,7 @@ from uwbbench.config.source import CaptureRef
 from uwbbench.gate.check import Check, Verdict
 from uwbbench.gate.config import Gate, LatencyGateModel, Side
 from uwbbench.gate.link import SetUpError, Worker, join, worker_of
-from uwbbench.gate.ratio import Ratio, Turn, canary, compared, log_ratio
+from uwbbench.gate.ratio import Ratio, Sampler, canary, compared, log_ratios
 
 TURN_S = 1.5e-3
 """A turn lasts about this long: thousands of readings of the clock, and less than the time slice of another process."""
@@ -29,7 +29,6 @@ MINIMUM_FRAMES = 100
 """With fewer frames the processor learns them by heart, and their times say little of new ones."""
 
 Told = Callable[[str], None]
-Sampler = Callable[[], float]
 
 
 def latency_checks(
@@ -77,9 +76,7 @@ def checks_within(
     if few:
         return few
     size = turn_size(min(found["call_s"] for found in joined.values()))
-    turns = {player: partial(_turn, worker, player, size) for player in joined}
-    again = partial(log_ratio, turns["base"], turns["base again"])
-    other = partial(log_ratio, turns["base"], turns["head"])
+    again, other = (partial(_blocks, worker, player, size) for player in ("base again", "head"))
     return _judged(label, settings, again, other, settings.blocks, "blocks", tell)
 
 
@@ -93,16 +90,22 @@ def _separately(
         few = _too_few(label, joined[0])
         if few:
             return few
-    pair = partial(_pair, gate, settings, ref)
+    pairs = partial(_pairs, gate, settings, ref)
     return _judged(
         label,
         settings,
-        partial(pair, base, base),
-        partial(pair, base, gate.head),
+        partial(pairs, base, base),
+        partial(pairs, base, gate.head),
         settings.processes,
         "processes",
         tell,
     )
+
+
+def _pairs(
+    gate: Gate, settings: LatencyGateModel, ref: CaptureRef, first: Side, second: Side, count: int
+) -> Sequence[float]:
+    return [_pair(gate, settings, ref, first, second) for _ in range(count)]
 
 
 def _pair(gate: Gate, settings: LatencyGateModel, ref: CaptureRef, first: Side, second: Side) -> float:
@@ -110,8 +113,8 @@ def _pair(gate: Gate, settings: LatencyGateModel, ref: CaptureRef, first: Side, 
     with worker_of(first, gate.model.timeout_s) as one, worker_of(second, gate.model.timeout_s) as other:
         joined = _both_joined((one, other), (first, second), settings, ref)
         size = turn_size(min(found["call_s"] for found in joined))
-        turns: list[Turn] = [partial(_turn, worker, "only", size) for worker in (one, other)]
-        return float(np.median([log_ratio(*turns) for _ in range(settings.blocks)]))
+        blocks = log_ratios(partial(_turn, one, size), partial(_turn, other, size), settings.blocks)
+        return float(np.median(np.array(blocks)))
 
 
 def _both_joined(
@@ -134,8 +137,13 @@ def turn_size(call_s: float) -> int:
     return max(TURN_FRAMES, math.ceil(TURN_S / call_s))
 
 
-def _turn(worker: Worker, player: str, size: int) -> float:
-    return float(worker.ask("turn", player=player, size=size)["spent_s"])
+def _turn(worker: Worker, size: int) -> float:
+    return float(worker.ask("turn", player="only", size=size)["spent_s"])
+
+
+def _blocks(worker: Worker, player: str, size: int, count: int) -> Sequence[float]:
+    found: Sequence[float] = worker.ask("blocks", base="base", head=player, size=size, count=count)["log_ratios"]
+    return found
 
 
 def _labelled(label: str, joined: dict[str, Any]) -> str:

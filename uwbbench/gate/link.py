@@ -98,7 +98,8 @@ class Worker:
             pass  # it has ended: what it said last is read below
         answer = self._answer(do)
         if "error" in answer:
-            raise SetUpError(str(answer["error"]))
+            where = "" if self.python == OWN else f"{self.python}: "
+            raise SetUpError(f"{where}{answer['error']}")
         return answer
 
     def _answer(self, do: str) -> dict[str, Any]:

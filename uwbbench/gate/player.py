@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import gc
 import hashlib
+from collections.abc import Sequence
+from functools import partial
 from time import perf_counter_ns
 
 import numpy as np
@@ -11,7 +13,9 @@ import numpy as np
 from uwbbench.api.arrays import FloatArray
 from uwbbench.api.capture import Capture
 from uwbbench.api.errors import CaptureError
+from uwbbench.gate.ratio import log_ratios
 from uwbbench.pipeline import Pipeline
+from uwbbench.timing.counters import core_waits
 from uwbbench.timing.loops import WINDOW_FRAMES, call_times_us, cut, stream_pass, warm_up
 from uwbbench.timing.paced import paced_pass, responses_us
 
@@ -54,22 +58,32 @@ class Player:
     def turn(self, size: int) -> float:
         """Time of the next ``size`` frames, in seconds; where too few are left, the capture starts again.
 
-        Opening a stream and cutting frames is not part of the time.
+        Opening a stream and cutting frames is not part of the time, nor is waiting for the core while other processes
+        have it, where the system tells. What the detector waits for by itself, such as a file, is.
         """
         size = min(size, len(self.whole))
         if self._at + size > len(self.whole):
-            self._stream, self._at = self.pipeline.open(self.capture), 0
+            self.rewind()
         calls = cut(self.whole.part(self._at, self._at + size), 1)
         self._at += size
         step = self._stream.step
         gc.disable()  # without collecting first, which takes longer than a turn and empties the caches
         try:
-            start = perf_counter_ns()
-            for frames in calls:
-                step(frames)
-            return (perf_counter_ns() - start) * 1e-9
+            with core_waits() as waits_ns:
+                before_ns = waits_ns()
+                start_ns = perf_counter_ns()
+                for frames in calls:
+                    step(frames)
+                spent_ns = perf_counter_ns() - start_ns
+                waited_ns = waits_ns() - before_ns
         finally:
             gc.enable()
+        # A wait between the readings of the two clocks, beside the timed part, may exceed it: it is none of it.
+        return (spent_ns - waited_ns if waited_ns < spent_ns else spent_ns) * 1e-9
+
+    def rewind(self) -> None:
+        """Start the capture again, with a stream opened anew."""
+        self._stream, self._at = self.pipeline.open(self.capture), 0
 
     def responses_us(self, count: int, rate_hz: float, *, paced: bool) -> FloatArray:
         """Response times (count,) of single frames, from the moment each is due to its answer.
@@ -84,3 +98,10 @@ class Player:
             one_by_one = [stream_pass(self.pipeline, self.capture, self.whole)[0] for _ in range(passes)]
             times_us = np.concatenate(one_by_one)[:count]
         return responses_us(times_us, 1e6 / rate_hz)
+
+
+def in_turns(base: Player, head: Player, size: int, blocks: int) -> Sequence[float]:
+    """Log ratios of blocks of two players on the same frames, from the start of the capture."""
+    for player in (base, head):
+        player.rewind()
+    return log_ratios(partial(base.turn, size), partial(head.turn, size), blocks)

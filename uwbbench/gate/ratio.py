@@ -2,10 +2,14 @@
 
 What is measured
 ----------------
-A *turn* is the time of the next frames of a capture, one frame a call; a *block* is four turns in the order ABBA, A
-being the base and B the head. Its log ratio is that of B's faster turn to A's faster one: drift of the machine meets
-both alike, and a turn that another process interrupted counts only where both were (with both cores busy, the interval
-was six times as wide for the sums of the turns).
+A *turn* is the time of the next frames of a capture, one frame a call; a *block* is four turns in the order ABBA or,
+the next time, BAAB. Its log ratio is that of the faster head to the faster base: drift of the machine meets both alike,
+and a turn that was disturbed counts only where both were (with both cores busy, the interval was six times as wide for
+the sums of the turns). Base and head go through the same frames.
+
+Left out of a turn is the time in which other processes had the core, which Linux counts for each thread: with both
+cores busy, that halved the scatter of blocks as long as a time slice (250 us a frame). Processor time would do the
+same, but a head that sleeps or waits for a file would pass. What others did to the caches stays in.
 
 * Two detectors of one environment live in one process. A sample is one block: 61 of them or more.
 * Two environments live in two processes, on one core, that take turns at a command. Where a process happens to lie in
@@ -28,16 +32,16 @@ follows: outside it the measurement is invalid, across its ends it is inconclusi
 
 Error rates
 -----------
-``python tests/bench/bench_gate.py`` runs 100 gates of a detector against itself and 100 against itself slowed by 10 %,
-and prints how many raised an alarm, each with its exact interval. A false alarm needs the lower end of the interval to
-pass 5 % although the medians of equal detectors scatter by some tenths of a per cent; a miss needs the upper end below
-5 % although the median is at 10 %.
+``python tests/bench/bench_gate.py`` runs 100 gates of each of two detectors against itself and 100 against itself
+slowed by 10 %, and prints how many raised an alarm, each with its exact interval. A false alarm needs the lower end of
+the interval to pass 5 % although the medians of equal detectors scatter by some tenths of a per cent; a miss needs the
+upper end below 5 % although the median is at 10 %.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -47,6 +51,9 @@ from uwbbench.gate.check import Verdict
 
 Turn = Callable[[], float]
 """Takes the next turn of a detector, and returns its time in seconds."""
+
+Sampler = Callable[[int], Sequence[float]]
+"""Measures so many log ratios."""
 
 RESAMPLES = 1000
 TAILS = (0.025, 0.975)
@@ -98,22 +105,25 @@ class Ratio:
         return Verdict.PASS if 1 / limit <= self.low and self.high <= limit else Verdict.INCONCLUSIVE
 
 
-def log_ratio(base: Turn, head: Turn) -> float:
-    """Log ratio of one block, in the order ABBA."""
-    first = base()
-    faster_head = min(head(), head())
-    return math.log(faster_head / min(first, base()))
+def log_ratios(base: Turn, head: Turn, blocks: int) -> Sequence[float]:
+    """Log ratios of blocks, in the orders ABBA and BAAB by turns."""
+    return [_log_ratio(base, head) if number % 2 == 0 else -_log_ratio(head, base) for number in range(blocks)]
 
 
-def sampled(
-    sample: Callable[[], float], minimum: int, patience: int, decide: Callable[[Ratio], Verdict]
-) -> tuple[Ratio, Verdict]:
+def _log_ratio(outer: Turn, inner: Turn) -> float:
+    """Log ratio of the faster inner turn to the faster outer one."""
+    first = outer()
+    faster_inner = min(inner(), inner())
+    return math.log(faster_inner / min(first, outer()))
+
+
+def sampled(sampler: Sampler, minimum: int, patience: int, decide: Callable[[Ratio], Verdict]) -> tuple[Ratio, Verdict]:
     """Take samples until they decide.
 
     Parameters
     ----------
-    sample : callable
-        Measures one log ratio.
+    sampler : callable
+        Measures so many log ratios.
     minimum : int
         Least number of samples.
     patience : int
@@ -129,7 +139,7 @@ def sampled(
     samples: list[float] = []
     goal = minimum
     while True:
-        samples += [sample() for _ in range(goal - len(samples))]
+        samples += sampler(goal - len(samples))
         ratio = Ratio.of(np.array(samples))
         verdict = decide(ratio)
         if verdict is not Verdict.INCONCLUSIVE or goal >= minimum * patience:
@@ -137,12 +147,12 @@ def sampled(
         goal = min(2 * goal, minimum * patience)
 
 
-def compared(sample: Callable[[], float], *, minimum: int, patience: int, limit: float) -> tuple[Ratio, Verdict]:
+def compared(sampler: Sampler, *, minimum: int, patience: int, limit: float) -> tuple[Ratio, Verdict]:
     """Base against head, by the rule above."""
-    ratio, verdict = sampled(sample, minimum, patience, lambda found: found.against(limit))
+    ratio, verdict = sampled(sampler, minimum, patience, lambda found: found.against(limit))
     return ratio, verdict if verdict is not Verdict.INCONCLUSIVE else ratio.finally_against(limit)
 
 
-def canary(sample: Callable[[], float], *, minimum: int, patience: int, limit: float) -> tuple[Ratio, Verdict]:
+def canary(sampler: Sampler, *, minimum: int, patience: int, limit: float) -> tuple[Ratio, Verdict]:
     """Base against base: pass where they look equal, invalid where they differ, else inconclusive."""
-    return sampled(sample, minimum, patience, lambda found: found.of_equals(limit))
+    return sampled(sampler, minimum, patience, lambda found: found.of_equals(limit))

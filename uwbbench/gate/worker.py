@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from uwbbench.api.capture import Capture
     from uwbbench.gate.player import Player
 
-PROTOCOL = 1
+PROTOCOL = 2
 """Raised whenever requests or answers change their meaning: only equal numbers understand each other."""
 
 
@@ -47,6 +47,12 @@ class Session:
     def turn(self, player: str, size: int) -> dict[str, Any]:
         """Time of the player's next frames."""
         return {"spent_s": self._players[player].turn(size)}
+
+    def blocks(self, base: str, head: str, size: int, count: int) -> dict[str, Any]:
+        """Log ratios of two players of this process."""
+        from uwbbench.gate.player import in_turns
+
+        return {"log_ratios": list(in_turns(self._players[base], self._players[head], size, count))}
 
     def respond(self, player: str, count: int, rate_hz: float, paced: bool) -> dict[str, Any]:
         """Response times of single frames."""

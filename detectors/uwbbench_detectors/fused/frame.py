@@ -13,18 +13,10 @@ from typing import Any
 import numpy as np
 
 from uwbbench.api.arrays import FloatArray, IntArray
-from uwbbench.api.compiled import compiled
+from uwbbench.api.compiled import compiled, inlined
 
 FLAT = -2
 """In place of a tap: the profile has flat tops."""
-
-
-@compiled
-def measure_magnitudes(samples: Any, row: int, amplitude: FloatArray) -> None:
-    """Write ``sqrt(re^2 + im^2)`` (taps,) of one row of samples in double precision."""
-    for tap in range(len(amplitude)):
-        real, imaginary = np.float64(samples[row, tap].real), np.float64(samples[row, tap].imag)
-        amplitude[tap] = math.sqrt(real * real + imaginary * imaginary)
 
 
 @compiled
@@ -37,23 +29,12 @@ def find_extremes(amplitude: FloatArray, start: int, ends: FloatArray) -> None:
     written[0], written[1] = low, high
 
 
-@compiled
-def scale_profile(amplitude: FloatArray, start: int, low: float, high: float, profile: FloatArray) -> bool:
-    """Write the profile from tap ``start`` on between the extremes; whether the frame varies by more than rounding."""
-    span = high - low
-    if not span > 8 * np.finfo(np.float64).eps * high:
-        return False
-    for tap in range(start, len(amplitude)):
-        profile[tap - start] = (amplitude[tap] - low) / span
-    return True
-
-
-@compiled
+@inlined
 def _scaled_square(value: float, largest: float) -> float:
     return (value / largest) * (value / largest)
 
 
-@compiled
+@inlined
 def root_mean_square(amplitude: FloatArray, start: int, stop: int) -> float:
     """Root mean square of taps ``start`` to ``stop``, scaled by the largest and added up as numpy does."""
     largest = 0.0

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from uwbbench.api.arrays import FloatArray, IntArray
-from uwbbench.api.compiled import compiled
+from uwbbench.api.compiled import compiled, inlined
 from uwbbench.api.geometry import SPEED_OF_LIGHT_M_S
 from uwbbench_detectors.fused import layout as at
 
@@ -47,7 +47,7 @@ def azimuth_of(pdoa_rad: float, limits: FloatArray) -> float:
     return float(math.asin(min(max(ratio, -1.0), 1.0)) / limits[at.ANGLE_DIVISOR] - limits[at.ANGLE_BIAS])
 
 
-@compiled
+@inlined
 def range_of(delay_s: float, azimuth_rad: float, how: IntArray, limits: FloatArray) -> float:
     """Bistatic range, as uwbbench.api.geometry has it; boresight where the azimuth is not known."""
     cosine, sine = 1.0, 0.0

@@ -1,61 +1,28 @@
-"""The search of frames for the detections of a whole chain of stages, compiled.
-
-Filters that look at single peaks commute, and the strongest peak that passes them all is the first one to pass by
-falling amplitude. So where one is wanted, peaks are examined in that order, each by the cheapest question first, and
-what nobody asks for is never computed. After a few rejections all peaks are described in one pass instead, whose cost
-grows with the taps alone.
-"""
+"""The search of frames for the detections of a whole chain of stages, compiled."""
 
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
+from numba.np.unsafe.ndarray import to_fixed_tuple
 
 from uwbbench.api.arrays import FloatArray, IntArray
-from uwbbench.api.compiled import compiled
+from uwbbench.api.compiled import compiled, inlined
 from uwbbench_detectors.fused import layout as at
-from uwbbench_detectors.fused.frame import (
-    FLAT,
-    crest_tap,
-    find_extremes,
-    find_maxima,
-    measure_magnitudes,
-    median_noise,
-    root_mean_square,
-    scale_profile,
-    strongest_crest,
-    vertex_shift,
-)
-from uwbbench_detectors.fused.place import azimuth_of, phase_difference, position_of, range_of
-from uwbbench_detectors.fused.shape import prominence_of, prominences_of, width_of
+from uwbbench_detectors.fused import short
+from uwbbench_detectors.fused.examine import MORE, NEAR, UNCLEAR, Signal, examine_all, examine_by_strength, examine_sets
+from uwbbench_detectors.fused.frame import crest_tap, find_extremes, median_noise, root_mean_square, vertex_shift
+from uwbbench_detectors.fused.lanes import BLOCK, LANES, largest_of, least_of
+from uwbbench_detectors.fused.layout import HOW, LIMITS
+from uwbbench_detectors.fused.place import azimuth_of, position_of, range_of
 
-TRIED_SINGLY = 4
-"""Peaks examined by falling amplitude before all are described."""
-
-NEAR = 1e-9
-"""A decision that hangs on a logarithm or an angle closer to its limit than this is left to the plain stages."""
-
-PASSED, FAILED, UNDECIDED = 0, 1, 2
-UNCLEAR, MORE = -1, -2
-STRONGER_THAN_ALL = np.int64(2**63 - 1)
+as_tuple: Any = to_fixed_tuple
+"""Settings as values of their own: those of an array are read anew after whatever is written to any array."""
 
 
-class Signal(NamedTuple):
-    """What the search knows of one frame, in numbers; arrays are handed on by themselves, which costs less."""
-
-    row: int
-    earliest: int
-    first_path: float
-    noise: float
-    noise_log: float
-    path: float
-    path1: float
-    path2: float
-
-
-@compiled
+@inlined
 def _noise(amplitude: FloatArray, how: IntArray) -> float:
     taps = how[at.NOISE_TAPS]
     if how[at.NOISE] == at.NOISE_LEADING:
@@ -74,137 +41,24 @@ def _judge(amplitude: FloatArray, how: IntArray, told: IntArray) -> None:
     told[at.SUSPICIOUS] += root_mean_square(amplitude, 0, taps) > at.SUSPICIOUS_RATIO * tail
 
 
-@compiled
+@inlined
 def _first_path(
-    amplitude: FloatArray, given: FloatArray, row: int, how: IntArray, limits: FloatArray
+    amplitude: FloatArray, room: FloatArray, given: float, how: IntArray, limits: FloatArray
 ) -> tuple[float, bool]:
     """Tap of the first path; and whether rounding could decide which."""
     if how[at.FIRST_PATH] == at.FIRST_PATH_GIVEN:
-        return given[row], False
+        return given, False
     if how[at.FIRST_PATH] == at.FIRST_PATH_FIXED:
         return limits[at.FIRST_PATH_TAP], False
-    crest = crest_tap(amplitude, how[at.CREST_START], how[at.CREST_STOP])
+    start, stop = how[at.CREST_START], how[at.CREST_STOP]
+    if start < stop <= LANES:
+        crest = short.strongest(room, short.taps_before(stop) & ~short.taps_before(start))
+    else:
+        crest = crest_tap(amplitude, start, stop)
     if how[at.FIRST_PATH] == at.FIRST_PATH_CREST:
         return float(crest), False
     shift, close = vertex_shift(amplitude, crest, True)
     return crest + shift, close
-
-
-@compiled
-def _examine(
-    amplitude: FloatArray,
-    profile: FloatArray,
-    responses1: Any,
-    responses2: Any,
-    how: IntArray,
-    limits: FloatArray,
-    signal: Signal,
-    place: int,
-    row: FloatArray,
-) -> int:
-    """Whether the peak at a place of the profile passes the filters; ``row`` (columns,) takes its properties.
-
-    ``row`` holds its prominence already, or NaN where that is not known.
-    """
-    if math.isnan(row[at.PROMINENCE]):
-        row[at.PROMINENCE] = prominence_of(profile, place)
-    if not row[at.PROMINENCE] >= limits[at.LEAST_PROMINENCE]:
-        return FAILED
-    row[at.WIDTH] = width_of(profile, place, row[at.PROMINENCE], limits[at.RELATIVE_HEIGHT])
-    if not limits[at.LEAST_WIDTH] <= row[at.WIDTH] <= limits[at.LARGEST_WIDTH]:
-        return FAILED
-    tap = place + how[at.PROFILE_START]
-    row[at.TAP], row[at.AMPLITUDE] = tap, amplitude[tap]
-    if how[at.SCORED]:
-        delay = (tap - signal.first_path) * limits[at.DELAY_UNIT]
-        row[at.SCORE] = 20 * (math.log10(amplitude[tap]) - signal.noise_log) + limits[at.GAIN_DB] * delay
-        if abs(row[at.SCORE] - limits[at.LEAST_SCORE]) < NEAR:
-            return UNDECIDED
-        if not row[at.SCORE] >= limits[at.LEAST_SCORE]:
-            return FAILED
-    if how[at.PHASED]:
-        taps = (float(tap), float(tap))
-        if how[at.ALIGNED]:
-            taps = (signal.path1 + (tap - signal.path), signal.path2 + (tap - signal.path))
-        above = how[at.WRAPPED_ABOVE] == 1
-        row[at.PDOA] = phase_difference(responses1, responses2, signal.row, taps, above)
-        size, largest = abs(row[at.PDOA]), limits[at.LARGEST_PDOA]
-        if math.pi - size < NEAR or abs(size - largest) < NEAR:
-            return UNDECIDED
-        if largest < np.inf and not size <= largest:
-            return FAILED
-    return PASSED
-
-
-@compiled
-def _examine_by_strength(
-    amplitude: FloatArray,
-    profile: FloatArray,
-    responses1: Any,
-    responses2: Any,
-    how: IntArray,
-    limits: FloatArray,
-    signal: Signal,
-    heights: IntArray,
-    strengths: IntArray,
-    passed: FloatArray,
-) -> int:
-    """Keep the strongest peak that passes: how many do, UNCLEAR where rounding could decide, or MORE after many."""
-    row = passed[0]
-    weakest = signal.noise * limits[at.LEAST_RATIO]
-    bound, best = STRONGER_THAN_ALL, -1
-    for _ in range(TRIED_SINGLY):
-        best = strongest_crest(heights, strengths, signal.earliest, bound, best)
-        if best == FLAT:
-            return MORE
-        # No peak is more prominent than it is high, and those left are no higher.
-        if best < 0 or not profile[best] >= limits[at.LEAST_PROMINENCE]:
-            return 0
-        if amplitude[best + how[at.PROFILE_START]] < weakest:
-            return 0
-        row[at.PROMINENCE] = np.nan
-        verdict = _examine(amplitude, profile, responses1, responses2, how, limits, signal, best, row)
-        if verdict != FAILED:
-            return 1 if verdict == PASSED else UNCLEAR
-        bound = strengths[best]
-    return MORE
-
-
-@compiled
-def _examine_all(
-    amplitude: FloatArray,
-    profile: FloatArray,
-    responses1: Any,
-    responses2: Any,
-    how: IntArray,
-    limits: FloatArray,
-    signal: Signal,
-    marked: Any,
-    places: IntArray,
-    passed: FloatArray,
-    single: bool,
-) -> int:
-    """Keep the peaks that pass, by rising tap, or the strongest: how many, or UNCLEAR where rounding could decide."""
-    start = how[at.PROFILE_START]
-    peaks = places[: find_maxima(profile, marked, places)]
-    prominence = prominences_of(profile, peaks)
-    kept = 0
-    for number in range(len(peaks)):
-        place = peaks[number]
-        if place < signal.earliest:
-            continue
-        if single and kept and not amplitude[place + start] > passed[0, at.AMPLITUDE]:
-            continue
-        passed[kept, at.PROMINENCE] = prominence[number]
-        verdict = _examine(amplitude, profile, responses1, responses2, how, limits, signal, place, passed[kept])
-        if verdict == UNDECIDED:
-            return UNCLEAR
-        if verdict == PASSED:
-            if single and kept:
-                passed[0] = passed[1]
-            else:
-                kept += 1
-    return kept
 
 
 @compiled
@@ -222,28 +76,35 @@ def _retain(passed: FloatArray, count: int, how: IntArray, retained: Any) -> Non
             retained[best] = 1
 
 
-@compiled
+@inlined
 def _finish(
-    row: FloatArray,
+    passed: FloatArray,
+    number: int,
     amplitude: FloatArray,
     first_path: float,
     robot_m: FloatArray,
     yaw_rad: FloatArray,
-    row_of_frame: int,
+    row: int,
     how: IntArray,
     limits: FloatArray,
 ) -> None:
     """Describe a retained peak further."""
+    tap = passed[number, at.TAP]
     if how[at.INTERPOLATE] != at.INTERPOLATE_NONE:
         logarithmic = how[at.INTERPOLATE] == at.INTERPOLATE_LOG_PARABOLA
-        row[at.TAP] += vertex_shift(amplitude, int(row[at.TAP]), logarithmic)[0]
-    row[at.AZIMUTH] = azimuth_of(row[at.PDOA], limits) if how[at.ANGLE] else np.nan
+        tap += vertex_shift(amplitude, int(tap), logarithmic)[0]
+        passed[number, at.TAP] = tap
+    azimuth_rad = np.nan
+    if how[at.ANGLE]:
+        azimuth_rad = azimuth_of(passed[number, at.PDOA], limits)
+        passed[number, at.AZIMUTH] = azimuth_rad
     if how[at.RANGED] != at.RANGED_NONE:
-        row[at.DELAY] = (row[at.TAP] - first_path) * limits[at.INTERVAL_S]
-        row[at.RANGE] = range_of(row[at.DELAY], row[at.AZIMUTH], how, limits)
-    if how[at.PLACED]:
-        robot = robot_m[row_of_frame]
-        row[at.X], row[at.Y] = position_of(row[at.RANGE], row[at.AZIMUTH], robot, yaw_rad[row_of_frame], limits)
+        delay_s = (tap - first_path) * limits[at.INTERVAL_S]
+        range_m = range_of(delay_s, azimuth_rad, how, limits)
+        passed[number, at.DELAY], passed[number, at.RANGE] = delay_s, range_m
+        if how[at.PLACED]:
+            placed = position_of(range_m, azimuth_rad, robot_m[row], yaw_rad[row], limits)
+            passed[number, at.X], passed[number, at.Y] = placed
 
 
 @compiled
@@ -259,8 +120,8 @@ def search(
     robot_m: FloatArray,
     yaw_rad: FloatArray,
     first: int,
-    how: IntArray,
-    limits: FloatArray,
+    settings: IntArray,
+    bounds: FloatArray,
     order: IntArray,
     told: IntArray,
     table: FloatArray,
@@ -283,8 +144,8 @@ def search(
         Poses, where positions are asked for; else anything.
     first : int
         Index of the first frame.
-    how, limits : arrays
-        Settings, as laid out in :mod:`uwbbench_detectors.fused.layout`.
+    settings, bounds : arrays
+        How the search goes and its limits, as laid out in :mod:`uwbbench_detectors.fused.layout`.
     order : (columns,) int array
         Which of all columns are written, in this order.
     told : (TOLD,) int array
@@ -299,15 +160,21 @@ def search(
     int
         Detections found; -1 less that if frames are irregular.
     """
-    start = how[at.PROFILE_START]
+    how, limits = as_tuple(settings, HOW), as_tuple(bounds, LIMITS)
+    start, stop = how[at.PROFILE_START], samples.shape[1]
     single = how[at.SELECT] == at.SELECT_STRONGEST and how[at.COUNT] == 1
     near = NEAR if how[at.FIRST_PATH] == at.FIRST_PATH_INTERPOLATED else 0.0
-    taps = samples.shape[1]
-    amplitude, ends = np.empty(taps), np.empty(2)
-    profile = amplitude[start:] if how[at.PROFILE] == at.PROFILE_AMPLITUDE else np.empty(taps - start)
+    scaled = how[at.PROFILE] != at.PROFILE_AMPLITUDE
+    lowest_from = 0 if how[at.PROFILE] == at.PROFILE_MINMAX_ALL_TAPS else start
+    is_short = stop <= LANES
+    everywhere = short.taps_before(stop)
+    inside, scaling = everywhere & ~short.taps_before(start), everywhere & ~short.taps_before(lowest_from)
+    strengths_room = np.empty(max(stop, LANES) + BLOCK)
+    heights_room = np.empty(len(strengths_room)) if scaled else strengths_room
+    amplitude, profile = strengths_room[:stop], heights_room[start:stop]
     heights, strengths = profile.view(np.int64), amplitude[start:].view(np.int64)
-    marked, places = np.empty(taps, np.uint8), np.empty(taps, np.int64)
-    passed = np.empty((2 if single else taps // 2 + 1, len(at.COLUMNS)))
+    ends = np.empty(2)
+    passed = np.empty((2 if single else stop // 2 + 1, len(at.COLUMNS)))
     retained = np.empty(len(passed), np.uint8)
     frame = table.view(np.int64)
     clear = True
@@ -316,20 +183,27 @@ def search(
         irregular[row] = False
         if not valid[row]:
             continue
-        measure_magnitudes(samples, row, amplitude)
-        find_extremes(amplitude, 0 if how[at.PROFILE] == at.PROFILE_MINMAX_ALL_TAPS else start, ends)
-        highest = ends[1]
-        for tap in range(start):
-            highest = max(highest, amplitude[tap])
+        short.measure(samples, row, strengths_room)
+        if is_short:
+            low, high = least_of(strengths_room, scaling), largest_of(strengths_room, scaling)
+            highest = largest_of(strengths_room, everywhere)
+        else:
+            find_extremes(amplitude, lowest_from, ends)
+            low, high = ends[0], ends[1]
+            highest = high
+            for tap in range(start):
+                highest = max(highest, amplitude[tap])
         regular = highest < np.inf
         if how[at.NOISE] == at.NOISE_LEADING and told[at.JUDGED] < at.FRAMES_JUDGED and regular and highest > 0:
             _judge(amplitude, how, told)
-        scaled = how[at.PROFILE] != at.PROFILE_AMPLITUDE
-        if scaled and regular and not scale_profile(amplitude, start, ends[0], ends[1], profile):
+        if scaled and regular and not short.scale(strengths_room, stop, low, high, heights_room):
             continue
-        first_path, close = _first_path(amplitude, given, row, how, limits)
+        first_path, close = _first_path(
+            amplitude, strengths_room, given[row] if how[at.FIRST_PATH] == at.FIRST_PATH_GIVEN else 0.0, how, limits
+        )
         guarded = first_path + limits[at.GUARD_TAPS]
-        close |= abs(guarded - np.rint(guarded)) < near
+        if near > 0:
+            close |= abs(guarded - np.rint(guarded)) < near
         noise = _noise(amplitude, how) if how[at.SCORED] else 1.0
         kept = UNCLEAR
         if regular and not close and math.isfinite(first_path) and noise > 0:
@@ -337,24 +211,25 @@ def search(
             paths = (path[row], path1[row], path2[row]) if how[at.ALIGNED] else (0.0, 0.0, 0.0)
             signal = Signal(row, earliest, first_path, noise, math.log10(noise), paths[0], paths[1], paths[2])
             kept = MORE
-            if single:
-                kept = _examine_by_strength(
-                    amplitude, profile, responses1, responses2, how, limits, signal, heights, strengths, passed
-                )
-            if kept == MORE:
-                kept = _examine_all(
-                    amplitude,
-                    profile,
+            if single and is_short:
+                kept = examine_sets(
+                    strengths_room,
+                    heights_room,
                     responses1,
                     responses2,
                     how,
                     limits,
                     signal,
-                    marked,
-                    places,
+                    inside,
+                    stop,
                     passed,
-                    single,
                 )
+            elif single:
+                kept = examine_by_strength(
+                    amplitude, profile, responses1, responses2, how, limits, signal, heights, strengths, passed
+                )
+            if kept == MORE:
+                kept = examine_all(amplitude, profile, responses1, responses2, how, limits, signal, passed, single)
         if kept == UNCLEAR:
             irregular[row], clear = True, False
             continue
@@ -362,7 +237,7 @@ def search(
             _retain(passed, kept, how, retained)
         for number in range(kept):
             if single or retained[number]:
-                _finish(passed[number], amplitude, first_path, robot_m, yaw_rad, row, how, limits)
+                _finish(passed, number, amplitude, first_path, robot_m, yaw_rad, row, how, limits)
                 frame[found, 0] = first + row
                 for column in range(len(order)):
                     table[found, 1 + column] = passed[number, order[column]]

@@ -15,6 +15,8 @@ from uwbbench_detectors.fused.chain import chain_of
 from .agreement import assert_same
 
 TAPS = 24
+LENGTHS = (TAPS, 26, 50, 63, 64, 65, 80)
+"""Around the most taps that are searched as bits of one word, and lengths that are no whole blocks."""
 SHIPPED = (
     "paper",
     "paper-filtering",
@@ -61,10 +63,10 @@ def captured(samples, sts=None, paths=None, **facts) -> Capture:
     )
 
 
-def responses(seed: int, kind: str, frames: int = 12, dtype=np.complex64):
+def responses(seed: int, kind: str, frames: int = 12, dtype=np.complex64, taps: int = TAPS):
     """Frames (frames, taps) in which decisions are hard: ties, flat tops, ripples, zeros, huge spans, gaps."""
     rng = np.random.default_rng(seed)
-    shape = (frames, TAPS)
+    shape = (frames, taps)
     if kind == "integers":
         samples = rng.integers(-3, 4, shape) + 1j * rng.integers(-3, 4, shape)
     elif kind == "spans":
@@ -72,7 +74,7 @@ def responses(seed: int, kind: str, frames: int = 12, dtype=np.complex64):
     elif kind == "ripple":
         samples = 1.0 + rng.integers(0, 3, shape) * 2.0**-23 + 0j
     elif kind == "comb":
-        samples = np.where(np.arange(TAPS) % 2, 1.0, 0.1) * (1 + 0.01 * rng.random(shape)) + 0j
+        samples = np.where(np.arange(taps) % 2, 1.0, 0.1) * (1 + 0.01 * rng.random(shape)) + 0j
     elif kind == "faulty":
         samples = rng.normal(size=shape) + 1j * rng.normal(size=shape)
         samples[rng.random(shape) < 0.01] = np.nan
@@ -81,7 +83,7 @@ def responses(seed: int, kind: str, frames: int = 12, dtype=np.complex64):
     else:
         samples = rng.normal(size=shape) + 1j * rng.normal(size=shape)
         samples[:, 6] += 20
-        samples[np.arange(frames), rng.integers(9, TAPS - 1, frames)] += 5
+        samples[np.arange(frames), rng.integers(9, taps - 1, frames)] += 5
     return samples.astype(dtype)
 
 
@@ -142,7 +144,7 @@ def chains(draw) -> str:
 KINDS = ("integers", "spans", "ripple", "comb", "faulty", "echoes")
 
 
-@settings(max_examples=120, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=200, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(
     text=chains(),
     kind=st.sampled_from(KINDS),
@@ -150,14 +152,15 @@ KINDS = ("integers", "spans", "ripple", "comb", "faulty", "echoes")
     double=st.booleans(),
     aligned=st.booleans(),
     from_transmission=st.booleans(),
+    taps=st.sampled_from(LENGTHS),
 )
-def test_any_chain_finds_the_same_fused_and_plain(text, kind, seed, double, aligned, from_transmission):
+def test_any_chain_finds_the_same_fused_and_plain(text, kind, seed, double, aligned, from_transmission, taps):
     dtype = np.complex128 if double else np.complex64
-    sts = [responses(seed + 1 + n, "integers" if kind == "integers" else "echoes", dtype=dtype) for n in range(2)]
+    sts = [responses(seed + 1 + n, "integers" if kind == "integers" else "echoes", 12, dtype, taps) for n in range(2)]
     rng = np.random.default_rng(seed)
     paths = [rng.uniform(4, 8, 12).round(2) for _ in range(3)] if aligned else None
     capture = captured(
-        responses(seed, kind, dtype=dtype), sts, paths, first_tap_delay_s=-6e-9 if from_transmission else None
+        responses(seed, kind, 12, dtype, taps), sts, paths, first_tap_delay_s=-6e-9 if from_transmission else None
     )
     detector = detector_from_yaml(text)
     assert detector.open(capture).fused
