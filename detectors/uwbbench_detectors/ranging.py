@@ -102,7 +102,7 @@ class PositionParams(Params):
 
 
 class Position(Stage[PositionParams]):
-    """World position of each detection: robot pose, then mount, then range and azimuth.
+    """World position of each detection: robot pose, then mount, then range and azimuth (arXiv 2512.01018).
 
     Targets are taken to stand at the receiver's height. Where odometry is asked for and the capture has none, the
     reference pose is used and the results say so.

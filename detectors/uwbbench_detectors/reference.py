@@ -8,7 +8,7 @@ from pydantic import Field
 from uwbbench.api import Block, Detections, FloatArray, IntArray, Params, Radar, Stage, Trajectory, Truth, ports
 from uwbbench.api.geometry import receiver_pose, to_world
 
-_PRODUCED = ports("detections", "range_m", "azimuth_rad", "x_m", "y_m")
+_PRODUCED = ports("detections", "range_m", "azimuth_rad", "amplitude", "x_m", "y_m")
 
 
 def _placed(block: Block, radar: Radar, rows: IntArray, range_m: FloatArray, azimuth_rad: FloatArray) -> Block:

@@ -55,7 +55,8 @@ class HeldRows:
         new = [name for name in found.names if name not in (*self._names, "cluster")]
         self._names = (*self._names, *new)
         self._rows = np.concatenate([self._rows, np.full((len(self._rows), len(new)), np.nan)], axis=1)
-        return Detections(found.frame, processed=(), **{name: found[name] for name in self._names[1:]})
+        columns: dict[str, Any] = {name: found[name] for name in self._names[1:]}
+        return Detections(found.frame, processed=(), **columns)
 
     def _make_room(self, count: int) -> None:
         """Drop the released rows, and have room for so many more, and for as many as are held."""

@@ -38,6 +38,7 @@ class FrameSearch(Kernel):
         chain, _ = chain_of(stages)
         self._how, self._limits = chain.how, chain.limits
         self._names = tuple(chain.columns)
+        self._width = 1 + len(self._names)
         self._order = np.array([at.COLUMNS.index(name) for name in chain.columns])
         self._one_a_frame = chain.how[at.SELECT] != at.SELECT_ALL and chain.how[at.COUNT] == 1
         self._given = chain.how[at.FIRST_PATH] == at.FIRST_PATH_GIVEN
@@ -58,13 +59,26 @@ class FrameSearch(Kernel):
 
     def detect(self, frames: Frames, first_path: FloatArray | None) -> Detections:
         """Detections in consecutive frames."""
-        count, taps = frames.preamble.shape
-        capacity = count if self._one_a_frame else count * (taps // 2)
-        table = np.empty((capacity, 1 + len(self._names)))
-        if len(self._irregular) != count:
-            self._irregular = np.empty(count, np.bool_)
+        samples = frames.preamble
+        count = len(samples)
+        capacity = count if self._one_a_frame else count * (samples.shape[1] // 2)
+        table = np.empty((capacity, self._width))
         irregular = self._irregular
-        if self._pool is not None and self._one_a_frame and count >= WORTH_SHARING and not self._judging:
+        if len(irregular) != count:
+            self._irregular = irregular = np.empty(count, np.bool_)
+        if self._alone and count < WORTH_SHARING:  # most calls of a stream, in which every step counts
+            found = self._search_alone(
+                samples if samples.flags.carray else np.array(samples),
+                frames.valid,
+                frames.first,
+                self._how,
+                self._limits,
+                self._order,
+                self._told,
+                table,
+                irregular,
+            )
+        elif self._pool is not None and self._one_a_frame and count >= WORTH_SHARING:
             found = self._shared(frames, first_path, table, irregular)
         else:
             found = self._searched(frames, first_path, self._told, table, irregular)
@@ -131,13 +145,17 @@ class FrameSearch(Kernel):
         assert self._pool is not None  # noqa: S101  (the caller asked)
         cuts = [len(frames) * part // self.threads for part in range(self.threads + 1)]
 
-        def searched(start: int, stop: int) -> int:
+        def searched(start: int, stop: int, told: IntArray) -> int:
             path = None if first_path is None else first_path[start:stop]
             part = slice(start, stop)
-            return self._searched(frames.part(start, stop), path, self._told.copy(), table[part], irregular[part])
+            return self._searched(frames.part(start, stop), path, told, table[part], irregular[part])
 
-        others = [self._pool.submit(searched, *ends) for ends in pairwise(cuts[1:])]
-        founds = [searched(cuts[0], cuts[1]), *(other.result() for other in others)]
+        judged = np.array([at.FRAMES_JUDGED, 0])
+        others = [self._pool.submit(searched, *ends, judged.copy()) for ends in pairwise(cuts[1:])]
+        founds = [searched(cuts[0], cuts[1], self._told), *(other.result() for other in others)]
+        if self._judging and self._told[at.JUDGED] < at.FRAMES_JUDGED:
+            # The first part had too few frames to judge the noise by: look at the others again, in their order.
+            founds[1:] = [searched(*ends, self._told) for ends in pairwise(cuts[1:])]
         total = 0
         for start, found in zip(cuts, founds, strict=False):
             rows = max(found, -1 - found)
