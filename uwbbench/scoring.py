@@ -8,7 +8,9 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from importlib import import_module
 from typing import Any, get_args
 
 from uwbbench.api.capture import CaptureHeader
@@ -25,9 +27,9 @@ from uwbbench.metrics.error import (
     matched_only,
 )
 from uwbbench.stats import evaluate
-from uwbbench.verdict import SCORINGS, Region, Scene, Scoring, ScoringRules, Table, judge
+from uwbbench.verdict import SCORINGS, Region, Scene, Scoring, ScoringRules, Table, Verdict, judge
 
-__all__ = ["SCORINGS", "Region", "ScoreBlock", "Scores", "Scoring", "ScoringRules", "outcomes", "score"]
+__all__ = ["SCORINGS", "Region", "ScoreBlock", "Scores", "Scoring", "ScoringRules", "outcomes", "score", "tables_of"]
 
 
 @dataclass(frozen=True)
@@ -103,11 +105,22 @@ class Scores:
     filtering : ScoreBlock
     mapping : ScoreBlock or None
         None where the detector does not cluster positions.
+    outcomes : mapping of str to Outcome
+        Of each table: what intervals are made of.
     """
 
     rules: ScoringRules
     filtering: ScoreBlock
     mapping: ScoreBlock | None = None
+    outcomes: Mapping[str, Outcome] = field(default_factory=dict, repr=False, compare=False)
+
+    def __repr__(self) -> str:
+        block, rules = self.filtering, self.rules
+        counts = f"{block.tp} true, {block.fp} false, {block.fn} missed"
+        return f"Scores({rules.scoring}, gate {rules.gate_m:g} m: {counts}, F1 {block.f1:.3f}, MAE {block.mae_m:.3f} m)"
+
+    def _repr_html_(self) -> str:
+        return str(import_module("uwbbench.display").scores(self))
 
     def __getitem__(self, table: str) -> ScoreBlock | None:
         if table not in get_args(Table):
@@ -166,8 +179,10 @@ def score(
     """
     rules = ScoringRules(scoring, gate_m, region or Region(), strongest)
     scene = Scene.of(found, capture)
-    mapped = _block(found, scene, rules, "mapping") if _is_mapped(found) else None
-    return Scores(rules, _block(found, scene, rules, "filtering"), mapped)
+    verdicts = {table: judge(found, scene, rules, table) for table in tables_of(found)}
+    blocks = {table: _block(found, scene, rules, table, verdict) for table, verdict in verdicts.items()}
+    kept: dict[str, Outcome] = {table: verdict.outcome for table, verdict in verdicts.items()}
+    return Scores(rules, blocks["filtering"], blocks.get("mapping"), kept)
 
 
 def outcomes(found: Detections, header: CaptureHeader, rules: ScoringRules) -> dict[str, Outcome]:
@@ -190,16 +205,16 @@ def outcomes(found: Detections, header: CaptureHeader, rules: ScoringRules) -> d
         As :func:`score`.
     """
     scene = Scene.of(found, header)
-    tables: list[Table] = ["filtering", "mapping"] if _is_mapped(found) else ["filtering"]
-    return {table: judge(found, scene, rules, table).outcome for table in tables}
+    return {table: judge(found, scene, rules, table).outcome for table in tables_of(found)}
 
 
-def _is_mapped(found: Detections) -> bool:
-    return all(column in found for column in ("cluster", "x_m", "y_m"))
+def tables_of(found: Detections) -> tuple[Table, ...]:
+    """Tables that detections can be judged by: ``mapping`` only where they are clustered."""
+    mapped = all(column in found for column in ("cluster", "x_m", "y_m"))
+    return ("filtering", "mapping") if mapped else ("filtering",)
 
 
-def _block(found: Detections, scene: Scene, rules: ScoringRules, table: Table) -> ScoreBlock:
-    verdict = judge(found, scene, rules, table)
+def _block(found: Detections, scene: Scene, rules: ScoringRules, table: Table, verdict: Verdict) -> ScoreBlock:
     everywhere = dataclasses.replace(rules, region=dataclasses.replace(rules.region, min_range_m=0.0))
     whole, matched = [verdict.outcome], [matched_only(verdict.outcome)]
     return ScoreBlock(

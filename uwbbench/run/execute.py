@@ -21,7 +21,7 @@ from typing import Any
 from joblib import Parallel, delayed
 
 from uwbbench.api.errors import StoreError, UwbbenchError
-from uwbbench.config.detector import DetectorConfig
+from uwbbench.config.detector import DetectorConfig, read_detector
 from uwbbench.pipeline import Pipeline
 from uwbbench.run import environment
 from uwbbench.run.experiment import Experiment
@@ -30,11 +30,11 @@ from uwbbench.run.hard_cases import failed as unexamined
 from uwbbench.run.hard_cases import identity_of as stability_identity
 from uwbbench.run.hard_cases import unit_of as stability_unit
 from uwbbench.run.plan import Plan, Unit, plan, reason_of, rules_of
-from uwbbench.run.scored import table_of
 from uwbbench.run.unit import Finished, Job, content_of, entry_of, identity_of, run_unit
 from uwbbench.store.folder import RunFolder
 from uwbbench.store.identity import canonical, plain
 from uwbbench.store.journal import Entry
+from uwbbench.store.scored import table_of
 from uwbbench.timing.machine import machine, usable_cores
 
 
@@ -111,6 +111,7 @@ def run_experiment(
     try:
         with _terminable():
             _Run(folder, experiment, todo, workers, progress).carry_out()
+        folder.seal()
     except KeyboardInterrupt:
         raise Interrupted(folder.path) from None
     return folder
@@ -135,10 +136,23 @@ def _created(experiment: Experiment, out: Path | None, jobs: int) -> RunFolder:
         out = Path("runs") / f"{safe}-{datetime.now():%Y%m%d-%H%M%S}"
     manifest = {
         "experiment": experiment.to_dict(),
-        "detectors": {config.name: Pipeline(config).identity for config in experiment.detectors},
+        **_code(experiment),
         "sessions": [environment.session(jobs)],
     }
     return RunFolder.create(out, manifest)
+
+
+def _code(experiment: Experiment) -> dict[str, Any]:
+    """Identities of the detectors and of the reference of times, and hashes of the sources of their stages."""
+    pipelines = [Pipeline(config) for config in experiment.detectors]
+    reference = None
+    if experiment.latency.enabled and experiment.latency.reference is not None:
+        reference = Pipeline(read_detector(experiment.latency.reference)).identity
+    return {
+        "detectors": {pipeline.name: pipeline.identity for pipeline in pipelines},
+        "sources": {use: sha256 for pipeline in pipelines for use, sha256 in pipeline.sources.items()},
+        "reference": reference,
+    }
 
 
 def _resumed(experiment: Experiment, out: Path | None, jobs: int) -> RunFolder:
@@ -153,7 +167,7 @@ def _resumed(experiment: Experiment, out: Path | None, jobs: int) -> RunFolder:
             "resume with the same experiment, or give a new folder"
         )
     folder.update_manifest(
-        detectors={config.name: Pipeline(config).identity for config in experiment.detectors},
+        **_code(experiment),
         sessions=[*folder.manifest["sessions"], environment.session(jobs)],
     )
     return folder

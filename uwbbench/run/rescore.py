@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from uwbbench.run.scored import score_rows, table_of
 from uwbbench.scoring import ScoringRules
 from uwbbench.store.folder import RunFolder
+from uwbbench.store.scored import score_rows, table_of
 
 
 def rescore(folder: RunFolder, rules: Sequence[ScoringRules] | None = None) -> None:

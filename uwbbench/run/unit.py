@@ -17,10 +17,10 @@ from uwbbench.api.detections import Detections
 from uwbbench.config.source import CaptureRef
 from uwbbench.pipeline import Pipeline
 from uwbbench.run.plan import Unit, reason_of
-from uwbbench.run.scored import score_rows
 from uwbbench.scoring import ScoringRules
 from uwbbench.store.identity import digest
 from uwbbench.store.journal import Entry, Status
+from uwbbench.store.scored import score_rows
 
 
 @dataclass(frozen=True)

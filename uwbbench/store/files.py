@@ -69,10 +69,10 @@ def read_json(path: Path) -> Any:
         If it is missing or broken.
     """
     with disk_errors(path, "read"):
-        text = path.read_text(encoding="utf-8")
+        content = path.read_bytes()
     try:
-        return json.loads(text)
-    except ValueError as error:
+        return json.loads(content)
+    except (ValueError, RecursionError) as error:
         raise StoreError(f"{path}: is not valid JSON: {error}") from error
 
 

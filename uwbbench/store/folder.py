@@ -1,7 +1,7 @@
 """A run folder: everything one experiment gave, enough to score and report it again without running anything.
 
 ==============================  ==========================================================================
-``manifest.json``               resolved configuration, versions, hashes, environment, command
+``manifest.json``               resolved configuration, versions, hashes, environment, command; sealed at the end
 ``journal.jsonl``               one line for each finished unit
 ``detections/UNIT.parquet``     what a detector found on a capture
 ``candidates/UNIT.parquet``     peaks before the filters, where ``peak`` scoring was asked for
@@ -15,6 +15,8 @@
 from __future__ import annotations
 
 import dataclasses
+import hashlib
+import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -35,7 +37,7 @@ from uwbbench.store.files import (
     write_parquet,
     write_text,
 )
-from uwbbench.store.identity import plain
+from uwbbench.store.identity import digest, plain
 from uwbbench.store.journal import Entry
 
 if TYPE_CHECKING:
@@ -88,10 +90,47 @@ class RunFolder:
         return cls(path)
 
     def update_manifest(self, **values: Any) -> None:
-        """Replace top-level values of the manifest."""
-        manifest = plain({**self.manifest, **values})
+        """Replace top-level values of the manifest, and break its seal: more results are to come."""
+        kept = {key: value for key, value in self.manifest.items() if key not in ("files", "seal")}
+        self._write_manifest({**kept, **values})
+
+    def _write_manifest(self, values: Mapping[str, Any]) -> None:
+        manifest = plain(values)
         write_json(self.path / "manifest.json", manifest)
         self.manifest = manifest
+
+    # Seal ------------------------------------------------------------------------------------------------------
+
+    def seal(self) -> None:
+        """Say that the run has ended: note the hash of every file of results, and of the manifest itself."""
+        self._seal({name: self.hash_of(name) for name in self.result_files()})
+
+    @property
+    def sealed(self) -> bool:
+        """Whether the run has ended."""
+        return "seal" in self.manifest
+
+    @property
+    def intact(self) -> bool:
+        """Whether the manifest of a run that has ended is as it was then."""
+        return bool(digest({k: v for k, v in self.manifest.items() if k != "seal"}) == self.manifest["seal"])
+
+    def _seal(self, files: Mapping[str, str]) -> None:
+        self.update_manifest(files=files)
+        self._write_manifest({**self.manifest, "seal": digest(self.manifest)})
+
+    def result_files(self) -> list[str]:
+        """Files that hold results, by their path in the folder; reports are made of these."""
+        folders = ("captures", "detections", "candidates", "times")
+        with disk_errors(self.path, "read"):
+            found = [path for name in folders for path in (self.path / name).glob("*") if path.is_file()]
+            found += [path for name in ("journal.jsonl", "scores.parquet") if (path := self.path / name).is_file()]
+        return sorted(path.relative_to(self.path).as_posix() for path in found)
+
+    def hash_of(self, name: str) -> str:
+        """SHA-256 of a file in the folder."""
+        with disk_errors(self.path / name, "read"), (self.path / name).open("rb") as file:
+            return hashlib.file_digest(file, "sha256").hexdigest()
 
     # Units -----------------------------------------------------------------------------------------------------
 
@@ -123,17 +162,17 @@ class RunFolder:
 
     def write_header(self, capture_id: str, header: CaptureHeader, sha256: str) -> None:
         """Store all of a capture but its samples, unless the same content is there already."""
-        stem = self.path / "captures" / capture_id
+        stem = self.path / "captures" / _safe(capture_id)
         if not stem.with_suffix(".json").is_file() or self.content(capture_id) != sha256:
             tables.write_header(stem, header, sha256)
 
     def header(self, capture_id: str) -> CaptureHeader:
         """Read a capture without its samples."""
-        return tables.read_header(self.path / "captures" / capture_id)
+        return tables.read_header(self.path / "captures" / _safe(capture_id))
 
     def content(self, capture_id: str) -> str:
         """SHA-256 of the content of a stored capture."""
-        return str(read_json(self.path / "captures" / f"{capture_id}.json")["sha256"])
+        return str(read_json(self.path / "captures" / f"{_safe(capture_id)}.json")["sha256"])
 
     # Times -----------------------------------------------------------------------------------------------------
 
@@ -158,6 +197,8 @@ class RunFolder:
         columns = {name: [_encodable(row.get(name)) for row in rows] for name in names}
         facts = {"rules": [dataclasses.asdict(rule) for rule in rules]}
         write_parquet(self._scores, pa.table(columns), facts)
+        if self.sealed:  # the other files keep the hashes that they had when the run ended
+            self._seal({**self.manifest["files"], self._scores.name: self.hash_of(self._scores.name)})
 
     def scores(self) -> pd.DataFrame:
         """Scores of every detector, capture, scoring and table; failed units are rows too.
@@ -193,7 +234,14 @@ class RunFolder:
         return self.path / name
 
     def _file(self, kind: str, unit: str) -> Path:
-        return self.path / kind / f"{unit}.parquet"
+        return self.path / kind / f"{_safe(unit)}.parquet"
+
+
+def _safe(identifier: str) -> str:
+    """Identifier as part of a file name; a journal edited by hand must not lead out of its folder."""
+    if not re.fullmatch(r"[\w-]{1,64}", identifier, flags=re.ASCII):
+        raise StoreError(f"expected the identifier of a unit or a capture, found {identifier[:80]!r}")
+    return identifier
 
 
 def _encodable(value: Any) -> Any:

@@ -95,8 +95,7 @@ def read(path: Path) -> tuple[dict[str, Entry], list[str]]:
             continue
         try:
             entry = Entry.from_dict(json.loads(line))
-        except (ValueError, TypeError, AttributeError):
+            found[entry.unit] = entry
+        except (ValueError, TypeError, AttributeError, RecursionError):
             notes.append(f"{path.name} line {number} is torn or damaged and was ignored")
-            continue
-        found[entry.unit] = entry
     return found, notes
