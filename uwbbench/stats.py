@@ -15,11 +15,12 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from uwbbench.api.arrays import FloatArray, IntArray
+from uwbbench.api.arrays import BoolArray, FloatArray, IntArray
 from uwbbench.api.metric import Metric, Outcome
 
 MINIMUM_GROUPS = 8
@@ -111,10 +112,14 @@ def bootstrap(
     """
     (groups,) = _groups([outcomes])
     partials = [metric.partial(group) for group in groups]
-    value = evaluate(metric, outcomes)
+    value = metric.value(merge(metric, partials)) if partials else math.nan
     low, high = _interval(_draws(metric, [partials], resamples, seed)[:, 0], confidence)
     few = tuple(metric.value(part) for part in partials) if len(groups) < MINIMUM_GROUPS else ()
-    return Estimate(value, low, high, _samples(metric, outcomes, value), len(groups), few)
+    if metric.merge == "stack":
+        n = sum(len(part) for part in partials)
+    else:
+        n = 0 if math.isnan(value) else sum(len(group.group) for group in groups)
+    return Estimate(value, low, high, n, len(groups), few)
 
 
 def paired_difference(
@@ -170,6 +175,36 @@ def paired_difference(
         per_group=few,
         p_value=math.nan if math.isnan(low) else _p_value(differences),
     )
+
+
+def paired_draws(
+    metric: type[Metric], series: Sequence[Sequence[Outcome]], *, resamples: int = 2000, seed: int = 0
+) -> FloatArray:
+    """Values of several detectors in resamples of the same captures.
+
+    Parameters
+    ----------
+    metric : type of Metric
+    series : sequence of sequences of Outcome
+        One for each detector, and in it one for each capture, the captures in the same order.
+    resamples : int
+    seed : int
+
+    Returns
+    -------
+    (resamples, detectors) array
+        Each row is of one draw of groups, the same for all detectors; no rows where there are too few groups.
+    """
+    partials = [[metric.partial(group) for group in groups] for groups in _groups(list(series))]
+    return _draws(metric, partials, resamples, seed)
+
+
+def subset(outcome: Outcome, frames: BoolArray) -> Outcome:
+    """Outcome of the marked ones (scored frames,) among its frames."""
+    rows = np.flatnonzero(frames)
+    position = np.empty(len(outcome.group), np.int64)
+    position[rows] = np.arange(len(rows))
+    return _taken(outcome, rows, np.flatnonzero(frames[outcome.error_frame]), position)
 
 
 def holm(p_values: ArrayLike) -> FloatArray:
@@ -271,20 +306,23 @@ def _split(outcome: Outcome, blocks: IntArray) -> list[Outcome]:
     parts = []
     for rows, found in zip(frames, errors, strict=True):
         position[rows] = np.arange(len(rows))
-        parts.append(
-            Outcome(
-                group=outcome.group[rows],
-                tp=outcome.tp[rows],
-                fp=outcome.fp[rows],
-                fn=outcome.fn[rows],
-                error_frame=position[outcome.error_frame[found]],
-                error_m=outcome.error_m[found],
-                matched=outcome.matched[found],
-                duration_s=outcome.duration_s * len(rows) / len(outcome.group) if len(rows) else 0.0,
-                exhaustive=outcome.exhaustive,
-            )
-        )
+        parts.append(_taken(outcome, rows, found, position))
     return parts
+
+
+def _taken(outcome: Outcome, rows: IntArray, found: IntArray, position: IntArray) -> Outcome:
+    """Outcome of some frames and their detections; ``position`` holds the new row of each frame."""
+    return Outcome(
+        group=outcome.group[rows],
+        tp=outcome.tp[rows],
+        fp=outcome.fp[rows],
+        fn=outcome.fn[rows],
+        error_frame=position[outcome.error_frame[found]],
+        error_m=outcome.error_m[found],
+        matched=outcome.matched[found],
+        duration_s=outcome.duration_s * len(rows) / len(outcome.group) if len(rows) else 0.0,
+        exhaustive=outcome.exhaustive,
+    )
 
 
 def _members(group: IntArray, blocks: IntArray) -> list[IntArray]:
@@ -297,15 +335,23 @@ def _members(group: IntArray, blocks: IntArray) -> list[IntArray]:
 
 def _draws(metric: type[Metric], series: list[list[FloatArray]], resamples: int, seed: int) -> FloatArray:
     """Metric (resamples, detectors) of drawn groups, the same draw for all detectors; none if groups are too few."""
-    count = len(series[0])
-    if count < MINIMUM_GROUPS:
+    groups = len(series[0])
+    if groups < MINIMUM_GROUPS:
         return np.empty((0, len(series)))
+    counts = _counts(groups, resamples, seed)
+    return np.stack([metric.resampled(partials, counts) for partials in series], axis=1)
+
+
+@lru_cache(maxsize=64)
+def _counts(groups: int, resamples: int, seed: int) -> FloatArray:
+    """How often each group (resamples, groups) is drawn; as many draws as groups.
+
+    Whole numbers, as floats: products of float matrices are many times faster.
+    """
     rng = np.random.default_rng(seed)
-    values = np.empty((resamples, len(series)))
-    for row in values:
-        drawn = rng.integers(count, size=count)
-        row[:] = [metric.value(merge(metric, [partials[group] for group in drawn])) for partials in series]
-    return values
+    drawn = rng.integers(groups, size=(resamples, groups))
+    cell = drawn + groups * np.arange(resamples)[:, None]
+    return np.bincount(cell.ravel(), minlength=resamples * groups).reshape(resamples, groups).astype(np.float64)
 
 
 def _interval(draws: FloatArray, confidence: float) -> tuple[float, float]:

@@ -186,7 +186,7 @@ def test_a_report_after_scoring_again_follows_the_new_rules(run: Run) -> None:
 def test_the_report_is_written_into_the_run_and_hostile_names_stay_text(run: Run, tmp_path: Path) -> None:
     text = 'schema: 1\nname: "x|<script>\\n# y"\npipeline:\n  - {use: reference.nothing}\n'
     (tmp_path / "hostile.yaml").write_text(text)
-    path = write_report(run("[hostile.yaml]"))
+    path = write_report(Report(run("[hostile.yaml]")))
     assert path.name == "report.md"
     assert "<script>" not in path.read_text()
     assert "\n# y" not in path.read_text()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -14,6 +15,7 @@ from uwbbench.api.errors import ConfigError
 from uwbbench.cli import options, render
 
 if TYPE_CHECKING:
+    from uwbbench.report import Report
     from uwbbench.run import Progress
     from uwbbench.store import RunFolder
 
@@ -57,7 +59,7 @@ def run(
     except Interrupted as stop:
         typer.echo(str(stop), err=True)
         raise typer.Exit(INTERRUPTED) from stop
-    _conclude(folder, json=json)
+    _conclude(folder, data_dir, json=json)
     if any(entry.status == "failed" for entry in folder.entries()):
         raise typer.Exit(UNITS_FAILED)
 
@@ -88,17 +90,112 @@ def _progress_bar(quiet: bool) -> Iterator[Callable[[Progress], None] | None]:
         yield advance
 
 
-def report(run: RunPath, json: options.Json = False) -> None:
-    """Print all tables of a run again. Nothing is run."""
-    from uwbbench.report import Report
-    from uwbbench.store import RunFolder
-    from uwbbench.store.identity import plain
+class Format(StrEnum):
+    """What a report is written as."""
 
-    made = Report(RunFolder(run))
+    HTML = "html"
+    MARKDOWN = "md"
+    CSV = "csv"
+    LATEX = "latex"
+    JSON = "json"
+
+
+SUFFIXES = {
+    ".html": Format.HTML,
+    ".htm": Format.HTML,
+    ".md": Format.MARKDOWN,
+    ".tex": Format.LATEX,
+    ".json": Format.JSON,
+}
+
+
+def report(
+    run: RunPath,
+    output: Annotated[
+        Path | None,
+        typer.Option("--output", "-o", metavar="FILE|DIR", help="Where to write; the suffix decides the format."),
+    ] = None,
+    form: Annotated[
+        Format | None, typer.Option("--format", help="Format; csv writes a folder of tables.", show_default=False)
+    ] = None,
+    figures: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="Write every chart as PNG, SVG and Vega-Lite.", show_default=False),
+    ] = None,
+    data_dir: options.DataDir = None,
+    force: Annotated[bool, typer.Option("--force", help="Replace a file that is no report.")] = False,
+    json: options.Json = False,
+) -> None:
+    """Print the tables of a run, or write its report.
+
+    As a page (.html), Markdown, CSV, LaTeX or JSON. No detector is run.
+
+    The page is one file that opens offline. Captures that are at hand are opened again to draw their samples.
+    """
+    from uwbbench.report import Report, read_safely
+    from uwbbench.store import RunFolder
+
+    chosen = _format_of(output, form, json=json)
+    with read_safely(run):
+        made = Report(RunFolder(run))
+        if chosen is None and figures is None:
+            render.print_report(made)
+        if figures is not None:
+            _write_figures(made, figures, data_dir, force=force)
+        if chosen is not None:
+            _write_report(made, chosen, output, data_dir, force=force)
+
+
+def _format_of(output: Path | None, form: Format | None, *, json: bool) -> Format | None:
+    """Format that the options ask for; None where the tables are to be printed."""
+    if json and (output is not None or form not in (None, Format.JSON)):
+        raise ConfigError("--json prints JSON; to write a file give -o with a suffix, or --format")
     if json:
-        render.print_json(plain(made.to_dict()))
+        return Format.JSON
+    if form is None and output is not None:
+        form = SUFFIXES.get(output.suffix.lower())
+        if form is None:
+            raise ConfigError(f"{output}: expected a name that ends in {', '.join(SUFFIXES)}, or --format csv")
+    if output is None and form in (Format.HTML, Format.CSV):
+        raise ConfigError(
+            f"--format {form.value} writes {'a file' if form is Format.HTML else 'a folder'}: name it by -o"
+        )
+    return form
+
+
+def _write_report(made: Report, form: Format, output: Path | None, data_dir: Path | None, *, force: bool) -> None:
+    from uwbbench.report import formats, markdown
+    from uwbbench.store.files import write_json, write_text
+
+    if output is not None:
+        formats.check_replaceable(output, force=force)
+    if form is Format.CSV and output is not None:
+        formats.write_csv(made, output)
+    elif form is Format.JSON:
+        render.print_json(formats.as_json(made)) if output is None else write_json(output, formats.as_json(made))
     else:
-        render.print_report(made)
+        text = {Format.MARKDOWN: markdown, Format.LATEX: formats.latex}.get(form)
+        written = _page(made, data_dir) if text is None else text(made)
+        typer.echo(written, nl=False) if output is None else write_text(output, written)
+    if output is not None:
+        typer.echo(f"report written to {output}", err=True)
+
+
+def _page(made: Report, data_dir: Path | None) -> str:
+    from uwbbench.config.source import data_roots
+    from uwbbench.report.page import Content, page
+
+    return page(Content(made, data_roots(data_dir)))
+
+
+def _write_figures(made: Report, folder: Path, data_dir: Path | None, *, force: bool) -> None:
+    from uwbbench.config.source import data_roots
+    from uwbbench.report import formats
+    from uwbbench.report.page import Content, write_figures
+
+    formats.check_replaceable(folder, force=force)
+    written = write_figures(Content(made, data_roots(data_dir)), folder)
+    typer.echo(f"{len(written)} figures written to {folder}", err=True)
 
 
 def rescore(
@@ -124,25 +221,30 @@ def rescore(
     chosen = scoring or [options.Scoring(rules.scoring) for rules in before]
     gate = before[0].gate_m if gate_m is None else gate_m
     score_again(folder, [replace(before[0], scoring=one.value, gate_m=gate) for one in dict.fromkeys(chosen)])
-    _conclude(folder, json=json)
+    _conclude(folder, None, json=json)
 
 
-def _conclude(folder: RunFolder, *, json: bool) -> None:
-    """Write the report into the run folder, and show its leaderboard."""
-    from uwbbench.report import Report, write_report
-    from uwbbench.store.identity import plain
+def _conclude(folder: RunFolder, data_dir: Path | None, *, json: bool) -> None:
+    """Write the report into the run folder, as Markdown and as a page, and show its leaderboard."""
+    from uwbbench.report import Report, formats, read_safely, write_report
+    from uwbbench.report.page import ReportToolsError
 
-    path = write_report(folder)
-    made = Report(folder)
-    if json:
-        render.print_json(plain(made.to_dict()))
-        return
-    render.print_leaderboard(made)
+    with read_safely(folder.path):
+        made = Report(folder)
+        path = write_report(made)
+        try:
+            path = folder.write_text("report.html", _page(made, data_dir))
+        except ReportToolsError as error:
+            typer.echo(f"note: no report.html: {error}", err=True)
+        if json:
+            render.print_json(formats.as_json(made))
+            return
+        render.print_leaderboard(made)
     typer.echo(f"run folder: {folder.path} (all tables: {path}, or 'uwbbench report {folder.path}')")
 
 
 def register(app: typer.Typer) -> None:
     """Add these commands."""
     app.command(epilog="Example: uwbbench run configs/experiments/demo.yaml --out demo")(run)
-    app.command(epilog="Example: uwbbench report demo --json")(report)
+    app.command(epilog="Example: uwbbench report demo -o demo.html")(report)
     app.command(epilog="Example: uwbbench rescore demo --scoring object --gate-m 0.1")(rescore)

@@ -14,6 +14,7 @@ Conventions
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import ClassVar, Literal
 
 import numpy as np
@@ -24,6 +25,11 @@ from uwbbench.api.metric import Metric, Outcome
 
 def _ratio(part: float, whole: float) -> float:
     return float(part / whole) if whole > 0 else math.nan
+
+
+def _ratios(part: FloatArray, whole: FloatArray) -> FloatArray:
+    """Ratios (resamples,), NaN where they are undefined."""
+    return np.asarray(np.divide(part, whole, out=np.full(len(part), math.nan), where=whole > 0))
 
 
 class Precision(Metric):
@@ -50,6 +56,12 @@ class Precision(Metric):
         tp, fp = partial
         return _ratio(tp, tp + fp)
 
+    @classmethod
+    def resampled(cls, partials: Sequence[FloatArray], counts: FloatArray) -> FloatArray:
+        """Precisions of many resamples."""
+        tp, fp = (counts @ np.stack(partials)).T
+        return _ratios(tp, tp + fp)
+
 
 class Recall(Metric):
     """Share of what was there that was found: tp / (tp + fn).
@@ -70,6 +82,12 @@ class Recall(Metric):
         """Ratio tp / (tp + fn)."""
         tp, fn = partial
         return _ratio(tp, tp + fn)
+
+    @classmethod
+    def resampled(cls, partials: Sequence[FloatArray], counts: FloatArray) -> FloatArray:
+        """Recalls of many resamples."""
+        tp, fn = (counts @ np.stack(partials)).T
+        return _ratios(tp, tp + fn)
 
 
 class F1(Metric):
@@ -98,6 +116,12 @@ class F1(Metric):
         tp, fp, fn = partial
         return _ratio(2 * tp, 2 * tp + fp + fn)
 
+    @classmethod
+    def resampled(cls, partials: Sequence[FloatArray], counts: FloatArray) -> FloatArray:
+        """F1 of many resamples."""
+        tp, fp, fn = (counts @ np.stack(partials)).T
+        return _ratios(2 * tp, 2 * tp + fp + fn)
+
 
 class FalseAlarmsPerMinute(Metric):
     """False positives in a minute of scored frames.
@@ -123,3 +147,9 @@ class FalseAlarmsPerMinute(Metric):
         """Rate fp / minutes."""
         fp, seconds = partial
         return _ratio(60 * fp, seconds)
+
+    @classmethod
+    def resampled(cls, partials: Sequence[FloatArray], counts: FloatArray) -> FloatArray:
+        """Rates of many resamples."""
+        fp, seconds = (counts @ np.stack(partials)).T
+        return _ratios(60 * fp, seconds)

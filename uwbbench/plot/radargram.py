@@ -14,8 +14,8 @@ from uwbbench.api.detections import Detections
 from uwbbench.api.errors import ConfigError
 from uwbbench.pipeline import Pipeline
 from uwbbench.plot import style
-from uwbbench.plot.delay import delay_of_range, zero_tap
 from uwbbench.plot.source import about
+from uwbbench.report.delay import delay_of_range, zero_tap
 from uwbbench.scoring import Region
 
 if TYPE_CHECKING:

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from uwbbench.report import published
-from uwbbench.report.sheet import Sheet, number, shown
+from uwbbench.report.sheet import Sheet, interval, number, shown
 from uwbbench.report.wording import TABLES, TITLES, scale
 
 if TYPE_CHECKING:
@@ -32,7 +32,9 @@ def paper_sheets(report: Report) -> Iterator[Sheet]:
                 number(row["channel"], 0),
                 shown(row["material"]),
                 row["source"],
-                *(number(row[name], *units[name][1:]) for name in _METRICS),
+                *(interval(row[name], row[f"{name}_low"], row[f"{name}_high"], *units[name][1:]) for name in _METRICS),
+                str(row["mae_n"]),
+                str(row["frames"]),
             )
             for row in table[table["table"] == kind].to_dict("records")
         ]
@@ -40,7 +42,7 @@ def paper_sheets(report: Report) -> Iterator[Sheet]:
         if report.repeats_the_paper:
             rows = sorted([*rows, *_published(kind, units)], key=lambda row: row[3:5])  # channel, then material
             notes = (f"'{_UNKNOWN}': the figure of {published.NAME} could not be read.", *published.NOTES[kind])
-        columns = ("detector", "scoring", "dataset", "channel", "material", "source", *heads)
+        columns = ("detector", "scoring", "dataset", "channel", "material", "source", *heads, "n", "frames")
         yield Sheet(f"By channel and material, {TABLES[kind]}", columns, tuple(rows), notes)
     if report.repeats_the_paper:
         yield _chain(report)
@@ -50,7 +52,7 @@ def _published(kind: str, units: dict[str, tuple[str, int, float]]) -> Iterator[
     for channel, material in published.ROWS:
         found = [(published.known(kind, channel, material, name), units[name]) for name in _METRICS]
         cells = [_UNKNOWN if value is None else number(value, digits + 1, by) for value, (_, digits, by) in found]
-        yield published.NAME, "peak", "its recordings", str(channel), material, "published", *cells
+        yield published.NAME, "peak", "its recordings", str(channel), material, "published", *cells, _UNKNOWN, _UNKNOWN
 
 
 def _chain(report: Report) -> Sheet:

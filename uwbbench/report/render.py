@@ -12,38 +12,77 @@ from uwbbench.report.report import Report
 from uwbbench.report.sheet import Sheet, escaped, interval, number, shown
 from uwbbench.report.wording import TABLES, TITLES, scale
 from uwbbench.stats import MINIMUM_GROUPS
-from uwbbench.store.folder import RunFolder
+
+LONGEST_LINE = 600
 
 
 def sheets(report: Report) -> list[Sheet]:
     """All tables of a report: leaderboards, the paper's tables, times, and what did not work."""
-    found = [*_leaderboards(report), *paper_sheets(report), *limits_sheets(report.limits)]
-    if not report.latency.empty:
-        found.append(_latency(report))
-    if report.stability:
-        found.append(_stability(report))
-    if report.captures:
+    made = Tables(report)
+    parts = (made.leaderboards, made.paper, made.limits, made.latency, made.stability, made.captures, made.failed)
+    return [sheet for part in parts for sheet in part()]
+
+
+class Tables:
+    """The tables of a report by what they are about; one that would be empty is left out.
+
+    Parameters
+    ----------
+    report : Report
+    """
+
+    def __init__(self, report: Report) -> None:
+        self._report = report
+
+    def leaderboards(self) -> Iterator[Sheet]:
+        """One for each dataset, scoring and table."""
+        return _leaderboards(self._report)
+
+    def paper(self) -> Iterator[Sheet]:
+        """The two tables of arXiv 2512.01018."""
+        return paper_sheets(self._report)
+
+    def limits(self) -> Iterator[Sheet]:
+        """Detectors against physical limits, where the run has test signals."""
+        return limits_sheets(self._report.limits)
+
+    def latency(self) -> Iterator[Sheet]:
+        """Times of every detector and timed capture."""
+        if not self._report.latency.empty:
+            yield _latency(self._report)
+
+    def stability(self) -> Iterator[Sheet]:
+        """How the detectors stood the hard cases."""
+        if self._report.stability:
+            yield _stability(self._report)
+
+    def captures(self) -> Iterator[Sheet]:
+        """What was compared on, with licence."""
         keys = ("dataset", "capture", "source", "frames", "license", "description")
-        rows = tuple(tuple(_line(str(one[key])) for key in keys) for one in report.captures)
-        found.append(Sheet("Captures", keys, rows))
-    if report.failures:
-        failed = tuple(
-            (str(e.kind), shown(e.detector), shown(e.dataset), shown(e.capture), _line(e.reason))
-            for e in report.failures
-        )
-        found.append(Sheet("Failed", ("what", "detector", "dataset", "capture", "reason"), failed))
-    if report.unscored:
-        rows = tuple(
-            (shown(e.detector), shown(e.capture), scoring, _line(reason)) for e, scoring, reason in report.unscored
-        )
-        found.append(Sheet("Not scored", ("detector", "capture", "scoring", "reason"), rows))
-    return found
+        if self._report.captures:
+            rows = tuple(tuple(_line(str(one[key])) for key in keys) for one in self._report.captures)
+            yield Sheet("Captures", keys, rows)
+
+    def failed(self) -> Iterator[Sheet]:
+        """What did not run, and what could not be scored, with reasons."""
+        if self._report.failures:
+            failed = tuple(
+                (str(e.kind), shown(e.detector), shown(e.dataset), shown(e.capture), _line(e.reason))
+                for e in self._report.failures
+            )
+            yield Sheet("Failed", ("what", "detector", "dataset", "capture", "reason"), failed)
+        if self._report.unscored:
+            rows = tuple(
+                (shown(e.detector), shown(e.capture), scoring, _line(reason))
+                for e, scoring, reason in self._report.unscored
+            )
+            yield Sheet("Not scored", ("detector", "capture", "scoring", "reason"), rows)
 
 
 def markdown(report: Report) -> str:
     """Whole report as Markdown."""
     name, about = report.experiment["name"], report.experiment["description"]
-    lines = [f"# {escaped(shown(name))}", ""]
+    lines = ["<!-- uwbbench report -->", f"# {escaped(shown(name))}", ""]
     if about:
         lines += [escaped(" ".join(about.split())), ""]
     lines += [sheet.markdown() for sheet in sheets(report)]
@@ -56,13 +95,15 @@ def markdown(report: Report) -> str:
     return "\n".join(lines) + "\n"
 
 
-def write_report(folder: RunFolder) -> Path:
-    """Write ``report.md`` into a run folder."""
-    return folder.write_text("report.md", markdown(Report(folder)))
+def write_report(report: Report) -> Path:
+    """Write ``report.md`` into its run folder."""
+    return report.folder.write_text("report.md", markdown(report))
 
 
 def _line(text: str) -> str:
-    return " ".join(text.split())
+    """Text on one line, without control characters, cut where it is very long."""
+    line = "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in " ".join(text.split()))
+    return line if len(line) <= LONGEST_LINE else f"{line[:LONGEST_LINE]}..."
 
 
 def _leaderboards(report: Report) -> Iterator[Sheet]:

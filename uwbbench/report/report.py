@@ -14,18 +14,21 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections import defaultdict
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from functools import cached_property
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from uwbbench import registry
-from uwbbench.metrics.error import MeanAbsoluteError, matched_only
+from uwbbench.api.errors import StoreError
 from uwbbench.report import published
 from uwbbench.report.limits import Limits
 from uwbbench.report.results import Scored, scored
-from uwbbench.stats import Estimate, bootstrap, evaluate
+from uwbbench.report.slices import estimates_of
+from uwbbench.stats import Estimate, bootstrap
 from uwbbench.store.folder import RunFolder
 from uwbbench.store.journal import Entry
 
@@ -34,6 +37,30 @@ if TYPE_CHECKING:
 
 STANDARD = ("precision", "recall", "f1", "mae", "p90", "p95", "sd", "false_alarms_per_minute")
 """Metrics of every leaderboard, by registered name."""
+
+
+@contextmanager
+def read_safely(path: Path) -> Iterator[None]:
+    """Turn what goes wrong over values that no run writes into one message about the folder.
+
+    Inside, numerical libraries use one thread: products of small matrices only get slower by more.
+
+    Raises
+    ------
+    StoreError
+        Where a stored value is missing, or of another kind than a run of this version writes.
+    """
+    from threadpoolctl import threadpool_limits
+
+    try:
+        with threadpool_limits(1):
+            yield
+    except (KeyError, TypeError, ValueError, AttributeError, IndexError) as error:
+        what = f"no {error}" if isinstance(error, KeyError) else f"{type(error).__name__}: {error}"
+        raise StoreError(
+            f"{path}: does not hold what a run of this version writes ({what}): it was edited, cut short, or made by "
+            "another version"
+        ) from error
 
 
 class Report:
@@ -71,9 +98,7 @@ class Report:
         settings = {**self.experiment["intervals"], "seed": self.experiment["seed"]}
         rows = []
         for members in groups.values():
-            outcomes = [one.outcome for one in members]
-            found = {name: bootstrap(metric, outcomes, **settings) for name, metric in self.metrics.items()}
-            found["matched_mae"] = bootstrap(MeanAbsoluteError, [matched_only(one) for one in outcomes], **settings)
+            found = estimates_of(self.metrics, [one.outcome for one in members], settings)
             rows.append((self._about(members), found))
         rows.sort(key=lambda row: self._rank(*row))
         return rows
@@ -135,13 +160,19 @@ class Report:
         for one in self.scored:
             order = one.table, one.scoring, self.detectors.index(one.detector), one.dataset, one.channel or 0
             groups[*order, one.material, one.source].append(one)
+        settings = {**self.experiment["intervals"], "seed": self.experiment["seed"]}
         rows = []
         for _, members in sorted(groups.items(), key=lambda item: item[0]):
             first = members[0]
             keys = ("table", "scoring", "detector", "dataset", "channel", "material", "source")
             outcomes = [one.outcome for one in members]
-            values = {name: evaluate(self.metrics[name], outcomes) for name in STANDARD[:7]}
-            rows.append({key: getattr(first, key) for key in keys} | {"captures": len(members)} | values)
+            row = {key: getattr(first, key) for key in keys} | {"captures": len(members)}
+            row["frames"] = sum(len(outcome.group) for outcome in outcomes)
+            for name in STANDARD[:7]:
+                estimate = bootstrap(self.metrics[name], outcomes, **settings)
+                row |= {name: estimate.value, f"{name}_low": estimate.low, f"{name}_high": estimate.high}
+                row[f"{name}_n"] = estimate.n
+            rows.append(row)
         return pd.DataFrame(rows)
 
     @cached_property

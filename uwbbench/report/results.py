@@ -6,10 +6,15 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
+from uwbbench.api.arrays import FloatArray
+from uwbbench.api.capture import CaptureHeader
 from uwbbench.api.errors import ScoringError, StoreError
 from uwbbench.api.metric import Outcome
-from uwbbench.scoring import ScoringRules, outcomes
+from uwbbench.scoring import ScoringRules, tables_of
 from uwbbench.store.folder import RunFolder
+from uwbbench.verdict import Scene, judge
 
 
 @dataclass(frozen=True)
@@ -28,6 +33,8 @@ class Scored:
     numbers : mapping
         The stored score row.
     outcome : Outcome
+    range_m : (scored frames,) array
+        True range of the nearest visible obstacle; NaN where there is none.
     """
 
     detector: str
@@ -42,6 +49,7 @@ class Scored:
     processed: int
     numbers: Mapping[str, Any]
     outcome: Outcome
+    range_m: FloatArray
 
 
 def scored(folder: RunFolder) -> list[Scored]:
@@ -61,14 +69,21 @@ def scored(folder: RunFolder) -> list[Scored]:
 
 
 def _scored(folder: RunFolder, rows: Mapping[Any, Any], rules: Sequence[ScoringRules]) -> Iterator[Scored]:
+    headers: dict[str, CaptureHeader] = {}
     for entry in folder.entries():
         if entry.kind != "accuracy" or entry.status != "done":
             continue
-        found, header = folder.detections(entry.unit), folder.header(entry.capture_id)
+        if entry.capture_id not in headers:
+            headers[entry.capture_id] = folder.header(entry.capture_id)
+        found, header = folder.detections(entry.unit), headers[entry.capture_id]
+        try:
+            scene = Scene.of(found, header)
+        except ScoringError:  # its reason is in the stored scores
+            continue
         for rule in rules:
             try:
-                tables = outcomes(found, header, rule)
-            except ScoringError:  # its reason is in the stored scores
+                tables = {name: judge(found, scene, rule, name).outcome for name in tables_of(found)}
+            except ScoringError:
                 continue
             for name, outcome in tables.items():
                 key = entry.detector, entry.dataset, entry.capture, rule.scoring, name
@@ -87,4 +102,12 @@ def _scored(folder: RunFolder, rows: Mapping[Any, Any], rules: Sequence[ScoringR
                     processed=len(found.processed),
                     numbers=rows[key],
                     outcome=outcome,
+                    range_m=_nearest_m(scene, rule),
                 )
+
+
+def _nearest_m(scene: Scene, rule: ScoringRules) -> FloatArray:
+    """Range (scored frames,) of the nearest visible obstacle."""
+    range_m = np.where(scene.visible(rule.region), scene.sight.range_m, np.inf)
+    nearest_m = range_m.min(axis=1, initial=np.inf)[scene.scored]
+    return np.where(np.isinf(nearest_m), np.nan, nearest_m)

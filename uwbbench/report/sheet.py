@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 LONGEST_NAME = 60
@@ -53,6 +54,25 @@ def shown(name: str) -> str:
     """Name on one line, without control characters, cut where it is very long."""
     text = "".join(char if char.isprintable() else char.encode("unicode_escape").decode() for char in name)
     return text if len(text) <= LONGEST_NAME else f"{text[: LONGEST_NAME - 3]}..."
+
+
+def labels(names: Iterable[str], longest: int = 28) -> dict[str, str]:
+    """Short label of each name, no two alike.
+
+    Examples
+    --------
+    >>> labels(["a" * 40, "a" * 41, "paper"], longest=6)["paper"]
+    'paper'
+    """
+    found: dict[str, str] = {}
+    for name in dict.fromkeys(names):
+        text = shown(name).strip() or "(no name)"
+        short = text if len(text) <= longest else f"{text[: longest - 1]}…"
+        label, copy = short, 2
+        while label in found.values():
+            label, copy = f"{short} ({copy})", copy + 1
+        found[name] = label
+    return found
 
 
 def number(value: object, digits: int, scale: float = 1.0) -> str:

@@ -5,7 +5,7 @@ import pytest
 
 from uwbbench.api import Radar
 from uwbbench.api.geometry import bistatic_range, direction
-from uwbbench.plot.delay import delay_of_range
+from uwbbench.report.delay import delay_of_range
 
 RADAR = Radar("test", 8e9, 5e8, 1e-9, 50.0, taps=50, tx_position_m=(-0.1, 0.3, 0.05))
 

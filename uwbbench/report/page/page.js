@@ -1,0 +1,242 @@
+"use strict";
+(() => {
+  const read = (id) => JSON.parse(document.getElementById(id).textContent);
+  const data = read("data"), config = read("theme-config");
+  const at = (id) => document.getElementById(id);
+  const root = document.documentElement;
+
+  // Theme ------------------------------------------------------------------------------------------------------
+  const themes = ["auto", "light", "dark"];
+  const remembered = () => { try { return localStorage.getItem("uwbbench-theme"); } catch { return null; } };
+  function setTheme(name) {
+    if (name === "auto") root.removeAttribute("data-theme"); else root.dataset.theme = name;
+    at("theme").textContent = "Theme: " + name;
+    at("theme").dataset.now = name;
+    try { localStorage.setItem("uwbbench-theme", name); } catch { /* private windows keep nothing */ }
+  }
+  at("theme").hidden = false;
+  at("theme").addEventListener("click", () => setTheme(themes[(themes.indexOf(at("theme").dataset.now) + 1) % 3]));
+  setTheme(themes.includes(remembered()) ? remembered() : "auto");
+
+  // Small helpers ----------------------------------------------------------------------------------------------
+  function make(tag, text, attributes = {}) {
+    const element = document.createElement(tag);
+    if (text !== undefined) element.textContent = text;
+    for (const [name, value] of Object.entries(attributes)) element.setAttribute(name, value);
+    return element;
+  }
+  function fill(select, options, keep) {
+    select.replaceChildren(...options.map(([value, text]) => make("option", text, { value })));
+    if (options.some(([value]) => value === keep)) select.value = keep;
+    select.disabled = options.length < 2;
+  }
+  const distinct = (values) => [...new Set(values)];
+  const shown = (value, digits, factor) => value === null ? "n/a" : (value * factor).toFixed(digits);
+
+  // Sorting, of any table whose head holds buttons --------------------------------------------------------------
+  const keyOf = (cell) => {
+    const text = cell.dataset.key ?? cell.textContent.trim();
+    const match = /^[-+]?\d[\d.]*(e[-+]?\d+)?/i.exec(text);
+    return match ? Number(match[0]) : /^(n\/a|not |none$|$)/.test(text) ? null : text;
+  };
+  function sortBy(table, column, descending) {
+    const body = table.tBodies[0];
+    const rows = [...body.rows].map((row) => [keyOf(row.cells[column]), row]);
+    const sign = descending ? -1 : 1;
+    rows.sort(([a], [b]) => {
+      if (a === null || b === null) return (a === null) - (b === null);
+      if (typeof a === "number" && typeof b === "number") return sign * (a - b);
+      return sign * String(a).localeCompare(String(b), "en", { numeric: true });
+    });
+    body.append(...rows.map(([, row]) => row));
+    [...table.tHead.rows[0].cells].forEach((head, index) => {
+      if (index === column) head.setAttribute("aria-sort", descending ? "descending" : "ascending");
+      else head.removeAttribute("aria-sort");
+    });
+  }
+  function sortable(table) {
+    [...table.tHead.rows[0].cells].forEach((head, column) => {
+      const button = make("button", head.textContent, { type: "button", title: "Sort by " + head.textContent });
+      button.addEventListener("click", () => {
+        const up = head.getAttribute("aria-sort") === "ascending";
+        const first = head.dataset.first === "descending" && !head.hasAttribute("aria-sort");
+        sortBy(table, column, first || up);
+      });
+      head.replaceChildren(button);
+    });
+  }
+  for (const table of document.querySelectorAll("table.sortable")) {
+    for (const row of table.tBodies[0].rows) for (const cell of row.cells) if (keyOf(cell) !== null && typeof keyOf(cell) === "string") cell.classList.add("text");
+    [...table.tHead.rows[0].cells].forEach((head, column) => head.classList.toggle("text", table.tBodies[0].rows[0].cells[column].classList.contains("text")));
+    sortable(table);
+  }
+
+  // Charts -----------------------------------------------------------------------------------------------------
+  const options = { mode: "vega-lite", renderer: "svg", actions: false, ast: true, defaultStyle: false, config, tooltip: { disableDefaultStyle: true } };
+  const views = new Map();
+  function wrapped(text, letters) {
+    const lines = [""];
+    for (const word of text.split(" ")) {
+      if (lines.at(-1) && (lines.at(-1) + " " + word).length > letters) lines.push(word);
+      else lines[lines.length - 1] += (lines.at(-1) ? " " : "") + word;
+    }
+    return lines;
+  }
+  async function draw(place, spec, why) {
+    views.get(place)?.finalize();
+    views.delete(place);
+    place.classList.toggle("empty", !spec);
+    if (!spec) { place.textContent = why; return null; }
+    place.replaceChildren();
+    const fitted = structuredClone(spec), letters = Math.max(24, Math.floor(place.clientWidth / 8.2));
+    fitted.title.text = wrapped(spec.title.text, letters);
+    fitted.title.subtitle = wrapped(spec.title.subtitle ?? "", letters * 1.12);
+    const made = await vegaEmbed(place, fitted, options);
+    views.set(place, { ...made, finalize: made.finalize, source: spec });
+    const picture = place.querySelector("svg");
+    picture.setAttribute("role", "img");
+    const head = spec.title;
+    picture.setAttribute("aria-label", head.text + ". " + (head.subtitle ?? ""));
+    for (const part of picture.querySelectorAll("[role], [aria-roledescription], [aria-label]")) {
+      for (const name of ["role", "aria-roledescription", "aria-label", "aria-hidden"]) part.removeAttribute(name);
+    }
+    return made.view;
+  }
+  // Titles are broken into lines for the width they were drawn for: another width is drawn anew.
+  let width = window.innerWidth, timer = 0;
+  window.addEventListener("resize", () => {
+    if (window.innerWidth === width) return;
+    width = window.innerWidth;
+    clearTimeout(timer);
+    timer = setTimeout(() => { for (const [place, { source }] of views) later(() => draw(place, source).then(() => choose(place))); }, 250);
+  });
+  function choose(place) {
+    const select = place.closest("article div:not(.chart)")?.querySelector("select");
+    return select && views.get(place).view.signal("detector", select.value).runAsync();
+  }
+  let waiting = Promise.resolve();
+  const later = (work) => { waiting = waiting.then(() => new Promise((go) => setTimeout(go, 0))).then(work); return waiting; };
+
+  // Boards -----------------------------------------------------------------------------------------------------
+  if (at("choose")) {
+    const numberOf = (board) => data.boards.indexOf(board);
+    const chosen = () => {
+      const fits = data.boards.filter((board) => board.dataset === at("dataset").value);
+      const scoring = fits.filter((board) => board.scoring === at("scoring").value);
+      return scoring.find((board) => board.table === at("table").value) ?? scoring[0] ?? fits[0];
+    };
+    const plain = (values) => values.map((value) => [value, value]);
+
+    function offer() {
+      const of = data.boards.filter((board) => board.dataset === at("dataset").value);
+      fill(at("scoring"), plain(distinct(of.map((board) => board.scoring))), at("scoring").value);
+      const tables = of.filter((board) => board.scoring === at("scoring").value);
+      fill(at("table"), plain(distinct(tables.map((board) => board.table))), at("table").value);
+      const board = chosen();
+      fill(at("metric"), board.charted.map((name) => [name, quantity(name).title]), at("metric").value);
+      const cuts = Object.keys(board.cuts).map((key) => key.split("|"));
+      for (const [id, values] of [["channel", distinct(cuts.map(([c]) => c))], ["material", distinct(cuts.map(([, m]) => m))]]) {
+        const single = values.filter((value) => value !== "");
+        fill(at(id), single.length < 2 ? [["", single[0] ?? "all"]] : values.map((value) => [value, value || "all"]), at(id).value);
+      }
+      const inside = data.spans.filter((span) => data.rows.some((row) => row[0] === numberOf(board) && row[3] === span));
+      fill(at("span"), [["", "all"], ...plain(inside)], at("span").value);
+    }
+    const quantity = (name) => data.quantities.find((one) => one.name === name);
+
+    const ahead = ["f1", "recall", "precision", "mae", "p95"], timed = ["time ratio", "p50 (us)", "p99 (us)"];
+    const counted = ["captures", "frames (n)", "detections (n)"];
+    const rank = (name) => ahead.includes(name) ? ahead.indexOf(name) : ahead.length;
+    function columnsOf(board) {
+      const open = ["precision", "f1", "false_alarms_per_minute"];
+      return data.quantities.map((one, index) => ({ one, index })).filter(({ one }) => board.exhaustive || !open.includes(one.name))
+        .sort((a, b) => rank(a.one.name) - rank(b.one.name));
+    }
+    function cellOf(value, low, high, digits, factor, title) {
+      const cell = make("td", shown(value, digits, factor));
+      cell.dataset.key = value === null ? "n/a" : String(value);
+      if (value === null) cell.classList.add("na");
+      if (low !== null && high !== null) cell.append(make("small", `[${shown(low, digits, factor)}, ${shown(high, digits, factor)}]`));
+      if (title) cell.title = title;
+      return cell;
+    }
+    function leaderboard() {
+      const board = chosen(), number = numberOf(board);
+      const cut = board.cuts[`${at("channel").value}|${at("material").value}`];
+      const wanted = at("search").value.trim().toLowerCase();
+      const rows = cut === undefined ? [] : data.rows.filter((row) => row[0] === number && `${row[1]}|${row[2]}` === cut && row[3] === at("span").value
+        && data.detectors[row[4]].toLowerCase().includes(wanted));
+      const columns = columnsOf(board);
+      const table = at("board");
+      const sorted = table.tHead ? [...table.tHead.rows[0].cells].find((head) => head.hasAttribute("aria-sort")) : null;
+      const before = sorted && [sorted.textContent, sorted.getAttribute("aria-sort") === "descending"];
+      const head = make("thead"), body = make("tbody"), line = make("tr");
+      line.append(make("th", "detector", { scope: "col" }));
+      for (const { one } of columns) line.append(make("th", one.unit ? `${one.title} (${one.unit})` : one.title, { scope: "col", "data-first": one.better === "higher" ? "descending" : "ascending" }));
+      for (const name of [...timed, ...counted]) line.append(make("th", name, { scope: "col" }));
+      head.append(line);
+      const recall = data.quantities.findIndex((one) => one.name === "recall");
+      const best = columns.map(({ one, index }) => {
+        const known = rows.filter((row) => row[7][recall][0] > 0).map((row) => row[7][index][0]).filter((value) => value !== null);
+        if (known.length < 2 || one.better === "zero") return null;
+        return one.better === "higher" ? Math.max(...known) : Math.min(...known);
+      });
+      for (const row of rows) {
+        const tr = make("tr"), values = row[7];
+        tr.append(make("th", data.detectors[row[4]], { scope: "row" }));
+        columns.forEach(({ one, index }, place) => {
+          const [value, low, high, n, groups] = values[index];
+          const title = value === null ? "undefined here: nothing was retained, nothing was to be found, or too few samples" : `n = ${n} ${one.samples}, ${groups} groups`;
+          const cell = cellOf(value, low, high, one.digits, one.factor, title);
+          if (value !== null && value === best[place] && values[recall][0] > 0) cell.classList.add("best");
+          tr.append(cell);
+        });
+        const times = data.times[board.timing][row[4]];
+        if (times === null) for (const _ of timed) tr.append(make("td", "not timed", { class: "na" }));
+        else {
+          const [ratio, low, high, p50, p99, calls] = times;
+          tr.append(cellOf(ratio, low, high, 2, 1, `n = ${calls} calls`), cellOf(p50, null, null, 0, 1, `n = ${calls} calls`), cellOf(p99, null, null, 0, 1, "needs 368 calls"));
+        }
+        const errors = data.quantities.findIndex((one) => one.name === "mae");
+        for (const count of [row[5], row[6], values[errors][3]]) tr.append(make("td", String(count)));
+        body.append(tr);
+      }
+      table.replaceChildren(table.caption ?? make("caption", "Leaderboard", { class: "hidden" }), head, body);
+      sortable(table);
+      const first = columns.find(({ one }) => one.name === (board.exhaustive ? "f1" : "recall")).one;
+      const heads = [...table.tHead.rows[0].cells].map((cell) => cell.textContent);
+      const column = before && heads.includes(before[0]) ? heads.indexOf(before[0]) : heads.indexOf(first.title);
+      if (rows.length) sortBy(table, column, before && heads.includes(before[0]) ? before[1] : true);
+      at("board-note").textContent = rows.length ? `${rows.length} detectors, ${board.dataset}, ${board.scoring} scoring, ${board.table}.`
+        : cut === undefined ? "No capture of this dataset has this channel with this material." : "No row fits these filters.";
+      at("board-missing").replaceChildren(...board.missing.map((text) => make("li", text)));
+    }
+    function drawBoard() {
+      const board = chosen(), number = numberOf(board), metric = at("metric").value;
+      const reasons = { pareto: "Nothing to draw: no detector was both timed against a reference and found anything here.", range: "Nothing to draw: the obstacles stay in one range bin, or each bin has too few samples.", cdf: "Nothing to draw: no detection has an error here." };
+      for (const kind of ["pareto", "range", "cdf"]) {
+        const spec = kind === "cdf" ? data.specs.cdf[number] : data.specs[kind][number][metric];
+        later(() => draw(document.querySelector(`[data-chart=${kind}]`), spec, reasons[kind]));
+      }
+    }
+    fill(at("dataset"), plain(distinct(data.boards.map((board) => board.dataset))));
+    for (const id of ["dataset", "scoring", "table"]) at(id).addEventListener("change", () => { offer(); leaderboard(); drawBoard(); });
+    at("metric").addEventListener("change", drawBoard);
+    for (const id of ["channel", "material", "span"]) at(id).addEventListener("change", leaderboard);
+    at("search").addEventListener("input", leaderboard);
+    for (const form of document.querySelectorAll("form")) form.addEventListener("submit", (event) => event.preventDefault());
+    offer(); leaderboard(); drawBoard();
+  }
+  // Charts that do not depend on the board -------------------------------------------------------------------
+  for (const place of document.querySelectorAll("[data-chart=latency]")) later(() => draw(place, data.specs.latency[Number(place.dataset.index)]));
+  for (const look of document.querySelectorAll(".look")) {
+    const specs = data.specs.looks[Number(look.dataset.look)];
+    for (const kind of ["radargram", "map"]) {
+      const place = look.querySelector(`[data-chart=${kind}]`);
+      place.closest("div:not(.chart)").querySelector("select")?.addEventListener("change", () => choose(place));
+      later(() => draw(place, specs[kind]).then(() => choose(place)));
+    }
+  }
+
+  later(() => { root.dataset.ready = "yes"; });
+})();

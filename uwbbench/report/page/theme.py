@@ -1,0 +1,68 @@
+"""Colours and type of charts: one palette that colour-blind readers tell apart, on light and on dark paper."""
+
+from __future__ import annotations
+
+from typing import Any
+
+SERIES = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#7A7A7A")
+"""The palette of Okabe and Ito, Color Universal Design (2008), without its yellow and with grey for its black."""
+
+SHAPES = ("circle", "square", "triangle-up", "diamond", "triangle-down", "cross", "triangle-right", "triangle-left")
+DASHES: tuple[list[int], ...] = ([1, 0], [7, 3], [2, 2], [8, 3, 2, 3], [12, 3], [1, 3], [5, 2, 1, 2, 1, 2])
+"""Eight markers and seven dashes: a colour that comes back has another marker."""
+
+FONT = "system-ui, -apple-system, 'Segoe UI', Roboto, 'Helvetica Neue', Arial, sans-serif"
+
+
+def config(*, ink: str, soft: str, line: str, paper: str) -> dict[str, Any]:
+    """Vega-Lite configuration for one paper."""
+    return {
+        "font": FONT,
+        "background": None,
+        "view": {"stroke": None},
+        "padding": 4,
+        "title": {
+            "color": ink,
+            "subtitleColor": soft,
+            "fontSize": 13,
+            "fontWeight": 600,
+            "subtitleFontSize": 11.5,
+            "offset": 12,
+            "subtitlePadding": 4,
+        },
+        "axis": {
+            "labelColor": soft,
+            "titleColor": ink,
+            "titleFontWeight": 500,
+            "titleFontSize": 11.5,
+            "labelFontSize": 11,
+            "gridColor": line,
+            "domainColor": soft,
+            "tickColor": soft,
+            "titlePadding": 8,
+        },
+        "legend": {
+            "labelColor": ink,
+            "titleColor": ink,
+            "labelFontSize": 11.5,
+            "symbolSize": 70,
+            "symbolStrokeWidth": 2,
+            "symbolOpacity": 1,
+        },
+        "style": {
+            "label": {"color": ink, "fontSize": 11.5},
+            "note": {"color": soft, "fontSize": 11},
+            "deadline": {"color": soft, "strokeWidth": 1.2},
+            "front": {"color": soft, "strokeWidth": 1.2},
+            "halo": {"color": paper, "strokeWidth": 5.5},
+            "range": {"color": SERIES[2], "strokeWidth": 3.5},
+            "truth": {"color": SERIES[2], "strokeWidth": 2.2},
+            "structure": {"color": soft, "strokeWidth": 1.0},
+            "path": {"color": soft, "strokeWidth": 1.2, "strokeDash": [4, 3]},
+        },
+    }
+
+
+PRINT = config(ink="#1b1f24", soft="#59636e", line="#e6e8eb", paper="#ffffff")
+PAGE = config(ink="var(--ink)", soft="var(--soft)", line="var(--grid)", paper="var(--paper)")
+"""On the page, colours are those of its style sheet, so that a switch of theme, and printing, draw nothing again."""
