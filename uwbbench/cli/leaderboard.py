@@ -1,0 +1,154 @@
+"""Commands about several runs, and about whether a run can be believed: ``leaderboard``, ``verify``, ``diff``."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from uwbbench.cli import options, render
+
+CHECK_FAILED = 1
+
+RunPaths = Annotated[list[Path], typer.Argument(metavar="RUN...", help="Run folders.", show_default=False)]
+
+
+def leaderboard(
+    runs: RunPaths,
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "--output",
+            "-o",
+            metavar="DIR",
+            help="Site: a new folder, or one that this command made.",
+            show_default=False,
+        ),
+    ] = None,
+    json: options.Json = False,
+) -> None:
+    """Put runs of several machines together: a table, or a site.
+
+    Every run is verified first; if something in one does not hold, nothing is written and the exit code is 1. Runs are
+    compared where experiment, content of captures and scoring rules agree; times only as ratios to the common
+    reference detector.
+    """
+    from uwbbench.leaderboard import Content, Unverified, check_site, read_runs, rendered, suites, write_site
+    from uwbbench.store.identity import plain
+
+    if output is not None:
+        check_site(output)
+    try:
+        verified = read_runs(runs, _progress)
+    except Unverified as error:
+        if json:
+            render.print_json({"problems": error.problems})
+        typer.echo(f"error: {error}", err=True)
+        raise typer.Exit(CHECK_FAILED) from error
+    content = Content(suites(verified), verified)
+    if output is not None:
+        files = rendered(content)
+        write_site(output, files)
+        typer.echo(f"site written to {output}: {len(files)} files, start with {output / 'index.html'}", err=True)
+    if json:
+        render.print_json(plain(content.to_dict()))
+        return
+    if output is None:
+        for section in content.sections:
+            board = content.board(section.main)
+            title = f"{content.names.suite(section.suite)}: {section.title}, {board.title}"
+            render.print_table(title, board.columns, [[_joined(cell) for cell in row] for row in board.rows])
+            for note in (content.sentence(section), *board.notes):
+                typer.echo(f"  {note}")
+            typer.echo()
+
+
+def _progress(text: str) -> None:
+    """Say on a terminal what is being done, as large runs take a while."""
+    if sys.stderr.isatty():
+        typer.echo(text, err=True)
+
+
+def _joined(cell: object) -> str:
+    return " ".join(part for part in (getattr(cell, "text", ""), getattr(cell, "small", "")) if part)
+
+
+def verify(runs: RunPaths, json: options.Json = False) -> None:
+    """Check that run folders hold what their runs wrote.
+
+    Files are compared with the hashes noted when the run ended; identities are computed again from the manifest, and
+    scores from the stored detections. Exits with 1 and a list if something does not hold, with 2 where a folder is no
+    run folder.
+    """
+    from uwbbench.store import RunFolder
+    from uwbbench.store.verify import verify as check
+
+    folders = [RunFolder(path) for path in runs]
+    found = {}
+    for folder in folders:
+        _progress(f"verifying {folder.path}")
+        found[str(folder.path)] = check(folder)
+    if json:
+        facts = {
+            path: {"passed": one.passed, "checked": one.checked, "problems": one.problems, "notes": one.notes}
+            for path, one in found.items()
+        }
+        render.print_json(facts)
+    else:
+        for path, one in found.items():
+            counts = ", ".join(f"{count} {what}" for what, count in one.checked.items())
+            typer.echo(f"{path}: {'verified' if one.passed else 'DOES NOT HOLD'} ({counts})")
+            for problem in one.problems:
+                typer.echo(f"  {problem}")
+            render.print_notes(one.notes)
+    if not all(one.passed for one in found.values()):
+        raise typer.Exit(CHECK_FAILED)
+
+
+def diff(
+    first: Annotated[Path, typer.Argument(metavar="A", help="Run folder: before.", show_default=False)],
+    second: Annotated[Path, typer.Argument(metavar="B", help="Run folder: after.", show_default=False)],
+    scoring: Annotated[
+        options.Scoring | None,
+        typer.Option(help="By which frames are compared; A's first if left out.", show_default=False),
+    ] = None,
+    frames: Annotated[int, typer.Option(min=0, metavar="N", help="Flipped frames to list.")] = 20,
+    figure: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Picture of the worst flipped frame (.png, .svg, .pdf).", show_default=False),
+    ] = None,
+    data_dir: options.DataDir = None,
+    exit_code: Annotated[bool, typer.Option("--exit-code", help="Exit with 1 where anything differs.")] = False,
+    json: options.Json = False,
+) -> None:
+    """Compare two runs: what went in, then scores, then frames.
+
+    What went in is configuration, code, data and machine. Both are judged by the rules of A, on the captures of equal
+    content that both have. Differences are B minus A with paired intervals. No detector is run. Measured times and the
+    machine never repeat: they are no difference for --exit-code.
+    """
+    from uwbbench.cli import differences
+    from uwbbench.comparison import compare
+    from uwbbench.store import RunFolder
+    from uwbbench.store.identity import plain
+
+    if figure is not None:
+        options.format_of(figure, ".png", ".svg", ".pdf")
+    found = compare(RunFolder(first), RunFolder(second), None if scoring is None else scoring.value, max(frames, 1))
+    if json:
+        render.print_json(plain(found.to_dict()))
+    else:
+        differences.print_comparison(found, frames)
+    if figure is not None:
+        differences.draw_worst(found, figure, data_dir)
+    if exit_code and found.differs:
+        raise typer.Exit(CHECK_FAILED)
+
+
+def register(app: typer.Typer) -> None:
+    """Add these commands."""
+    app.command(epilog="Example: uwbbench diff before after --figure worst.png")(diff)
+    app.command(epilog="Example: uwbbench leaderboard runs/* -o site")(leaderboard)
+    app.command(epilog="Example: uwbbench verify demo")(verify)

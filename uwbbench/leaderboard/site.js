@@ -1,0 +1,48 @@
+"use strict";
+(() => {
+  const root = document.documentElement, button = document.getElementById("theme");
+  const themes = ["auto", "light", "dark"];
+  const remembered = () => { try { return localStorage.getItem("uwbbench-theme"); } catch { return null; } };
+  function setTheme(name) {
+    if (name === "auto") root.removeAttribute("data-theme"); else root.dataset.theme = name;
+    button.textContent = "Theme: " + name;
+    button.dataset.now = name;
+    try { localStorage.setItem("uwbbench-theme", name); } catch { /* private windows keep nothing */ }
+  }
+  button.hidden = false;
+  button.addEventListener("click", () => setTheme(themes[(themes.indexOf(button.dataset.now) + 1) % 3]));
+  setTheme(themes.includes(remembered()) ? remembered() : "auto");
+
+  const keyOf = (cell) => {
+    const text = cell.dataset.key ?? cell.textContent.trim();
+    const match = /^([-+<]?\d[\d.]*(?:e[-+]?\d+)?)(?: of \d+)?$/i.exec(text);
+    return match ? Number(match[1].replace("<", "")) : /^(n\/a|not timed$|none$|–$|$)/.test(text) ? null : text;
+  };
+  function sortBy(table, column, descending) {
+    const body = table.tBodies[0], sign = descending ? -1 : 1;
+    const rows = [...body.rows].map((row) => [keyOf(row.cells[column]), row]);
+    rows.sort(([a], [b]) => {
+      if (a === null || b === null) return (a === null) - (b === null);
+      if (typeof a === "number" && typeof b === "number") return sign * (a - b);
+      return sign * String(a).localeCompare(String(b), "en", { numeric: true });
+    });
+    body.append(...rows.map(([, row]) => row));
+    [...table.tHead.rows[0].cells].forEach((head, index) => {
+      if (index === column) head.setAttribute("aria-sort", descending ? "descending" : "ascending");
+      else head.removeAttribute("aria-sort");
+    });
+  }
+  for (const table of document.querySelectorAll("table.sortable")) {
+    for (const row of table.tBodies[0].rows) for (const cell of row.cells) if (typeof keyOf(cell) === "string" && !cell.querySelector("small")) cell.classList.add("text");
+    [...table.tHead.rows[0].cells].forEach((head, column) => {
+      head.classList.toggle("text", table.tBodies[0].rows[0].cells[column].classList.contains("text"));
+      const sort = document.createElement("button");
+      sort.type = "button";
+      sort.textContent = head.textContent;
+      sort.title = "Sort by " + head.textContent;
+      sort.addEventListener("click", () => sortBy(table, column, head.getAttribute("aria-sort") === "ascending"));
+      head.replaceChildren(sort);
+    });
+  }
+  root.dataset.ready = "yes";
+})();
