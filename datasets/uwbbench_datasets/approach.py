@@ -44,15 +44,15 @@ class ApproachParams(Params):
     """What is approached, and how."""
 
     channel: Literal[5, 9] = Field(9, description="IEEE 802.15.4 channel.")
-    material: Literal["metal", "concrete", "plywood"] = "metal"
+    material: Literal["metal", "concrete", "plywood"] = Field("metal", description="Of the plate.")
     runs: int = Field(1, ge=1, le=1000, description="Captures with different noise.")
     start_m: float = Field(3.4, gt=0, description="First distance from the receiver to the plate.")
     stop_m: float = Field(0.6, gt=0, description="Last distance.")
-    speed_m_s: float = Field(0.3, gt=0)
-    frame_rate_hz: float = Field(48.0, gt=0)
+    speed_m_s: float = Field(0.3, gt=0, description="Speed of the robot.")
+    frame_rate_hz: float = Field(48.0, gt=0, description="Frames a second.")
     lateral_m: float = Field(0.1, description="Sideways offset of the plate from the path, positive to the left.")
     sts: bool = Field(True, description="Whether the capture has the two STS responses.")
-    seed: int = Field(1, ge=0)
+    seed: int = Field(1, ge=0, description="Draws noise and ringing.")
 
 
 class Approach(Dataset[ApproachParams]):

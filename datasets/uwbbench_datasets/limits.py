@@ -46,10 +46,10 @@ class LimitsParams(Params):
         ge=-20, le=80, description="Power of the crest of an echo over that of the noise; of a lacking one in 'noise'."
     )
     separation_ns: float | None = Field(None, gt=0, le=15, description="Delay between the two echoes of a pair.")
-    frames: int = Field(3000, ge=1, le=1_000_000)
+    frames: int = Field(3000, ge=1, le=1_000_000, description="Frames of the capture.")
     min_range_m: float = Field(0.2, ge=0, description="Nearest echo.")
     max_range_m: float = Field(6.0, gt=0, le=6.3, description="Farthest echo; the taps end at 6.4 m.")
-    seed: int = Field(1, ge=0)
+    seed: int = Field(1, ge=0, description="Draws places, phases and noise.")
 
     @model_validator(mode="after")
     def _belongs_together(self) -> Self:
