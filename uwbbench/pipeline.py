@@ -7,6 +7,7 @@ import hashlib
 import json
 from collections.abc import Iterator, Mapping
 from functools import cache
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -58,6 +59,9 @@ class Pipeline:
 
     def __repr__(self) -> str:
         return f"Pipeline({self.name}: {' -> '.join(step.label for step in self.config.steps)})"
+
+    def _repr_html_(self) -> str:
+        return str(import_module("uwbbench.display").detector(self))
 
     def _check_ports(self) -> None:
         available = {"frames"}
@@ -204,12 +208,17 @@ class Pipeline:
     @property
     def identity(self) -> str:
         """SHA-256 over the resolved configuration and the sources of its stages."""
-        sources = {step.use: source_hash(registry.load("stages", step.use).__module__) for step in self.config.steps}
+        text = json.dumps({"detector": self.config.to_dict(), "sources": self.sources}, sort_keys=True)
+        return hashlib.sha256(text.encode()).hexdigest()
+
+    @property
+    def sources(self) -> dict[str, str]:
+        """SHA-256 of the sources of each stage, and of the kernels that may stand for some, by name."""
+        found = {step.use: source_hash(registry.load("stages", step.use).__module__) for step in self.config.steps}
         for name in registry.entries("kernels"):
             with contextlib.suppress(PluginError):  # one that cannot be loaded is not used
-                sources[f"kernel {name}"] = source_hash(registry.load("kernels", name).__module__)
-        text = json.dumps({"detector": self.config.to_dict(), "sources": sources}, sort_keys=True)
-        return hashlib.sha256(text.encode()).hexdigest()
+                found[f"kernel {name}"] = source_hash(registry.load("kernels", name).__module__)
+        return found
 
 
 def _makers_of(port: str) -> list[str]:

@@ -7,6 +7,7 @@ import json
 from collections.abc import Iterator
 from dataclasses import dataclass, field, fields
 from functools import cached_property
+from importlib import import_module
 from typing import Any, Literal, Protocol, runtime_checkable
 
 import numpy as np
@@ -84,6 +85,13 @@ class CaptureHeader:
     def __len__(self) -> int:
         return len(self.trajectory)
 
+    def __repr__(self) -> str:
+        size = f"{len(self)} frames of {self.radar.taps} taps, {self.duration_s:.2f} s"
+        return f"{type(self).__name__}({self.name!r}, {self.source}: {size})"
+
+    def _repr_html_(self) -> str:
+        return str(import_module("uwbbench.display").capture(self))
+
     @property
     def duration_s(self) -> float:
         """Time from the first to the end of the last frame."""
@@ -100,7 +108,7 @@ _PER_FRAME = (
 )
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, repr=False)
 class Capture(CaptureHeader):
     """One run of one receiver.
 

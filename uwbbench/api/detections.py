@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -166,6 +167,9 @@ class Detections:
 
     def __repr__(self) -> str:
         return f"Detections({len(self)} in {len(self.processed)} frames: {', '.join(self.columns)})"
+
+    def _repr_html_(self) -> str:
+        return str(import_module("uwbbench.display").detections(self))
 
     def __contains__(self, column: str) -> bool:
         return column in self.columns

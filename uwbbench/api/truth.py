@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from importlib import import_module
 
 import numpy as np
 
@@ -93,6 +94,12 @@ class Truth:
 
     objects: tuple[Obstacle, ...]
     exhaustive: bool = True
+
+    def __repr__(self) -> str:
+        return f"Truth({len(self.objects)} objects, {'exhaustive' if self.exhaustive else 'not exhaustive'})"
+
+    def _repr_html_(self) -> str:
+        return str(import_module("uwbbench.display").truth(self))
 
     def seen_from(self, radar: Radar, trajectory: Trajectory) -> Sight:
         """Range and azimuth of every object from every pose of the receiver.

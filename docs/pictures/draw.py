@@ -1,0 +1,47 @@
+"""Draw the pictures of the documentation and the README from simulated captures: ``make pictures``."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+from PIL import Image
+
+HERE = Path(__file__).parent
+IMAGES = HERE.parent / "images"
+WIDTH = 1200
+"""Pixels across, enough for a page on a dense screen."""
+
+
+def main(folder: Path) -> None:
+    """Run the experiment and draw everything; ``folder`` is emptied first."""
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir(parents=True)
+    for words in (
+        ("run", HERE / "boxes.yaml", "--out", folder / "boxes"),
+        ("report", folder / "boxes", "--figures", folder / "figures"),
+        ("simulate", "approach-metal", "--set", "radar.channel=9", "-o", folder / "approach.h5"),
+        ("plot", "radargram", folder / "approach.h5", "--detector", "paper", "-o", folder / "radargram.png"),
+        ("simulate", "demonstration-lab", "-o", folder / "laboratory.h5"),
+        ("plot", "map", folder / "laboratory.h5", "--detector", "paper", "-o", folder / "map.png"),
+        ("tune", HERE / "tune.yaml", "-o", folder / "tuned", "--figure", folder / "stable-zone.png"),
+    ):
+        subprocess.run([sys.executable, "-m", "uwbbench.cli", *map(str, words)], check=True)  # noqa: S603 - fixed words
+    shutil.copyfile(folder / "figures" / "pareto-1-frame-filtering-f1.svg", IMAGES / "speed-against-f1.svg")
+    for name in ("radargram.png", "map.png", "stable-zone.png"):
+        shrink(folder / name, IMAGES / name)
+
+
+def shrink(source: Path, target: Path) -> None:
+    """Picture of at most :data:`WIDTH` pixels and 256 colours, chosen so that rare ones stay themselves."""
+    with Image.open(source) as picture:
+        scale = min(1.0, WIDTH / picture.width)
+        size = round(picture.width * scale), round(picture.height * scale)
+        small = picture.convert("RGB").resize(size, Image.Resampling.LANCZOS)
+        small.quantize(256, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE).save(target, optimize=True)
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))
