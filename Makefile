@@ -3,16 +3,20 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: test lint bench demo clean
+.PHONY: test test-slow lint bench demo docs pictures clean
 .DELETE_ON_ERROR:
 
 $(VENV)/ready: pyproject.toml
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --editable ".[test,lint]"
+	$(BIN)/python -m pip install --quiet --editable ".[test,lint,docs]"
 	touch $@
 
 test: $(VENV)/ready
-	$(BIN)/python -m pytest -n 2 --dist loadfile
+	$(BIN)/python -m pytest -n 2 --dist loadfile -m "not slow and not browser"
+
+# What takes longer: pages in a real browser, examples of the documentation, packages installed by pip.
+test-slow: $(VENV)/ready
+	$(BIN)/python -m pytest -n 2 --dist loadfile -m "slow or browser"
 
 lint: $(VENV)/ready
 	$(BIN)/ruff format --check .
@@ -32,6 +36,14 @@ demo: $(VENV)/ready
 	rm -rf demo
 	$(BIN)/uwbbench run configs/experiments/demo.yaml --out demo
 	$(BIN)/uwbbench plot cdf demo -o demo/errors.png
+
+# Pages to read offline: build/docs/index.html. Every warning is an error; tests/docs runs the examples.
+docs: $(VENV)/ready
+	$(BIN)/sphinx-build --fail-on-warning --quiet --jobs auto docs build/docs
+
+# The pictures in docs/images, from simulated captures; takes some minutes.
+pictures: $(VENV)/ready
+	$(BIN)/python docs/pictures/draw.py build/pictures
 
 clean:
 	rm -rf $(VENV) demo build dist

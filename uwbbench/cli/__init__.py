@@ -15,7 +15,21 @@ from typer.core import TyperGroup
 
 import uwbbench
 from uwbbench.api.errors import UwbbenchError
-from uwbbench.cli import data, evaluate, gate, inspection, plot, runs, simulate, stability, time, tune, warmup
+from uwbbench.cli import (
+    data,
+    evaluate,
+    gate,
+    inspection,
+    leaderboard,
+    plot,
+    runs,
+    scaffold,
+    simulate,
+    stability,
+    time,
+    tune,
+    warmup,
+)
 
 USAGE_ERROR, INTERRUPTED = 2, 130
 
@@ -68,7 +82,21 @@ def _start(
     """Benchmark UWB radar detectors: the same captures, the same metrics, speed against error."""
 
 
-for _group in (runs, evaluate, time, tune, gate, inspection, data, simulate, stability, plot, warmup):
+for _group in (
+    runs,
+    evaluate,
+    time,
+    tune,
+    gate,
+    inspection,
+    data,
+    simulate,
+    stability,
+    scaffold,
+    plot,
+    warmup,
+    leaderboard,
+):
     _group.register(app)
 
 

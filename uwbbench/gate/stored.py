@@ -8,9 +8,9 @@ from typing import Any
 
 from uwbbench.api.detections import Detections
 from uwbbench.api.errors import ConfigError, StoreError, nearest
-from uwbbench.run.scored import score_rows
 from uwbbench.store.folder import RunFolder
 from uwbbench.store.journal import Entry
+from uwbbench.store.scored import score_rows
 
 
 class StoredRun:
