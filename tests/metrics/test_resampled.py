@@ -29,7 +29,9 @@ def test_errors(metric, seed: int, groups: int, longest: int) -> None:
     partials = [rng.normal(size=rng.integers(0, longest + 1)).round(1) for _ in range(groups)]
     counts = drawn(rng, groups)
     expected = one_by_one(metric, partials, counts)
-    np.testing.assert_allclose(metric.resampled(partials, counts), expected, rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(
+        metric.resampled(partials, counts), expected, rtol=1e-9, atol=1e-8
+    )  # the root of what cancels
 
 
 @pytest.mark.parametrize("metric", COUNTS)
