@@ -77,9 +77,9 @@ class DetectorBenchmark:
         """One frame a round; taking the next frame is not timed."""
         from uwbbench.timing.loops import endless
 
-        source = endless(whole, 1 / capture.radar.frame_rate_hz)
-        step = pipeline.open(capture).step
-        self._benchmark.pedantic(step, setup=lambda: ((next(source),), {}), rounds=rounds or ROUNDS)
+        stream = pipeline.open(capture)
+        source = endless(whole, 1 / capture.radar.frame_rate_hz, renumbered="truth" not in stream.needs)
+        self._benchmark.pedantic(stream.step, setup=lambda: ((next(source),), {}), rounds=rounds or ROUNDS)
 
     def _batch(self, pipeline: Pipeline, capture: Capture, whole: Frames, rounds: int | None) -> None:
         """The whole capture a round, each time with a fresh stream and fresh frames, which remember nothing."""

@@ -43,6 +43,14 @@ def test_a_second_pass_profits_nothing_from_the_first(approach: Capture) -> None
         assert stream.fresh
 
 
+def test_a_detector_that_looks_up_the_truth_gets_the_old_numbers_again(approach: Capture) -> None:
+    whole = approach.frames(5, 12)
+    frames = list(itertools.islice(loops.endless(whole, 0.5, renumbered=False), 30))
+    assert [one.first for one in frames] == [5 + index % 7 for index in range(30)]
+    oracle = load_detector("oracle").open(approach)
+    assert sum(len(oracle.step(one)) for one in frames) == 30
+
+
 def test_endless_frames_go_on_as_one_recording(approach: Capture) -> None:
     whole = approach.frames(5, 12)
     frames = list(itertools.islice(loops.endless(whole, 0.5), 30))

@@ -13,6 +13,8 @@ from uwbbench.timing import memory
 class Keeping:
     """A detector that keeps some bytes of every frame."""
 
+    needs: frozenset[str] = frozenset()
+
     def __init__(self, bytes_a_frame: int) -> None:
         self.bytes_a_frame, self.kept = bytes_a_frame, []
 

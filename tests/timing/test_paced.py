@@ -14,6 +14,8 @@ from uwbbench.timing.paced import paced_pass, paced_summary, responses_us
 class Noting:
     """A detector that notes when it was called, and takes its time."""
 
+    needs: frozenset[str] = frozenset()
+
     def __init__(self, takes_s: float = 0.0) -> None:
         self.takes_s = takes_s
         self.called_s: list[float] = []

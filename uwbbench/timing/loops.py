@@ -41,14 +41,16 @@ def cut(whole: Frames, size: int) -> list[Frames]:
     return [whole.part(start, min(start + size, len(whole))) for start in range(0, len(whole), size)]
 
 
-def endless(whole: Frames, period_s: float) -> Iterator[Frames]:
+def endless(whole: Frames, period_s: float, *, renumbered: bool = True) -> Iterator[Frames]:
     """Single frames without end: the preloaded ones again and again, with numbers and times that go on.
 
-    A stream then sees one long recording, in which the robot is put back to its start now and then.
+    A stream then sees one long recording, in which the robot is put back to its start now and then. A detector that
+    looks up the truth must get the old numbers again, which alone have one: not ``renumbered``.
     """
     lap_s = float(whole.timestamp_s[-1] - whole.timestamp_s[0]) + period_s
     for lap in itertools.count():
-        first, timestamp_s = whole.first + lap * len(whole), whole.timestamp_s + lap * lap_s
+        first = whole.first + lap * len(whole) if renumbered else whole.first
+        timestamp_s = whole.timestamp_s + lap * lap_s
         again = dataclasses.replace(whole, first=first, timestamp_s=timestamp_s)
         for at in range(len(again)):
             yield again.part(at, at + 1)

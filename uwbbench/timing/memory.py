@@ -67,8 +67,9 @@ def _grown(
     pipeline: Pipeline, capture: Capture, whole: Frames, reading: Callable[[], int | None]
 ) -> tuple[float | None, int]:
     """Growth of a reading for 1 000 frames of one stream, and the frames that it was seen over."""
-    step = pipeline.open(capture).step
-    source = endless(whole, 1 / capture.radar.frame_rate_hz)
+    stream = pipeline.open(capture)
+    step = stream.step
+    source = endless(whole, 1 / capture.radar.frame_rate_hz, renumbered="truth" not in stream.needs)
 
     def run(frames: int, limit_s: float) -> int:
         until = perf_counter() + limit_s

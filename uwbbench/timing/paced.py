@@ -53,8 +53,8 @@ def paced_pass(
     lateness_us : (frames,) array
         From the moment at which the call could have started (the frame was due and the detector free) to its start.
     """
-    step = pipeline.open(capture).step
-    source = endless(whole, 1 / rate_hz)
+    stream = pipeline.open(capture)
+    step, source = stream.step, endless(whole, 1 / rate_hz, renumbered="truth" not in stream.needs)
     count = max(1, round(seconds * rate_hz))
     period_ns, spin_ns = 1e9 / rate_hz, min(SPIN_S, 0.25 / rate_hz) * 1e9
     times_ns, lateness_ns = np.empty(count), np.empty(count)
