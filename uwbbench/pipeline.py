@@ -22,7 +22,7 @@ from uwbbench.api.kernel import Kernel
 from uwbbench.api.stage import Stage
 from uwbbench.config.detector import DetectorConfig, detector_from_text, read_detector
 from uwbbench.sources import source_hash
-from uwbbench.stream import Opened, Stream, without_invalid
+from uwbbench.stream import Opened, Stream
 
 BATCH_FRAMES = 4096
 """Frames a block of :meth:`Pipeline.run`: large enough to be fast, small enough for a million frames."""
@@ -202,7 +202,7 @@ class Pipeline:
         first = next(place for place, step in enumerate(opened) if "detections" in step.stage.produces)
         stream = Stream(opened[:first], [])
         for frames in capture.blocks(BATCH_FRAMES):
-            yield stream.through(Block(without_invalid(frames)))
+            yield stream.through(Block(frames.without_invalid()))
         yield from stream.tails()
 
     @property

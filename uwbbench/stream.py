@@ -68,11 +68,11 @@ class Stream:
             Usually of these frames; of earlier ones behind a stage that holds detections back.
         """
         if self._kernel is None:
-            return self._emit(self.through(Block(without_invalid(frames))))
+            return self._emit(self.through(Block(frames.without_invalid())))
         found = self._kernel.detect(frames, None)
         if len(self._steps) == 1:
             return found
-        return self._emit(self.through(Block(without_invalid(frames), detections=found), 1))
+        return self._emit(self.through(Block(frames.without_invalid(), detections=found), 1))
 
     def flush(self) -> Detections:
         """Detections that were still held back; ends the stream."""
@@ -159,18 +159,6 @@ class Stream:
     def _place(self, label: str) -> int:
         """Place of a step in the chain, where it stands from its first block on."""
         return list(self.chain).index(label) if label in self.chain else len(self.chain)
-
-
-def without_invalid(frames: Frames) -> Frames:
-    """Frames with the samples of invalid ones set to zero, so that no stage's state is poisoned by NaN."""
-    if frames.valid.all():
-        return frames
-    parts: dict[str, Any] = {}
-    for name in ("preamble", "sts1", "sts2"):
-        samples = getattr(frames, name)
-        if samples is not None:
-            parts[name] = np.where(frames.valid[:, None], samples, 0)
-    return Frames(**{**{k: v for k, v in vars(frames).items() if k != "amplitude"}, **parts})
 
 
 def _without_rows_of_invalid(block: Block) -> Block:

@@ -49,8 +49,7 @@ def inlined(function: F) -> F:
     """Compile a function, as :func:`compiled` does, into each function that calls it.
 
     A call of its own counts up, and down again, the references to every array that it hands over, by operations that
-    lock the memory: some 50 ns for a function of a few arrays. For functions that are called for every frame from one
-    place.
+    lock the memory. For functions that are called for every frame from one place.
 
     Parameters
     ----------

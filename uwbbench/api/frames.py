@@ -6,6 +6,7 @@ import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -81,6 +82,16 @@ class Frames:
     def with_preamble(self, preamble: ComplexArray) -> Frames:
         """Return the same frames with other samples, for example after clutter removal."""
         return dataclasses.replace(self, preamble=preamble)
+
+    def without_invalid(self) -> Frames:
+        """Frames with the samples of invalid ones set to zero, so that no stage's state is poisoned by NaN."""
+        if self.valid.all():
+            return self
+        samples = {name: getattr(self, name) for name in ("preamble", "sts1", "sts2")}
+        cleared: dict[str, Any] = {
+            name: np.where(self.valid[:, None], values, 0) for name, values in samples.items() if values is not None
+        }
+        return dataclasses.replace(self, **cleared)
 
     def part(self, start: int, stop: int) -> Frames:
         """Frames ``start`` to ``stop`` of this block, as views."""

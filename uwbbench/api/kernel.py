@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from abc import abstractmethod
 from collections.abc import Sequence
 from typing import Any, ClassVar
 
@@ -43,11 +42,10 @@ class Kernel(Stage[Params]):
         self.gather_notes()
 
     @classmethod
-    @abstractmethod
     def covers(cls, stages: Sequence[Stage[Any]]) -> int:
         """How many of these opened stages, from the first on, the kernel does in one pass; 0 for none."""
+        raise NotImplementedError
 
-    @abstractmethod
     def detect(self, frames: Frames, first_path: FloatArray | None) -> Detections:
         """Detections in consecutive frames.
 
@@ -63,6 +61,7 @@ class Kernel(Stage[Params]):
         Detections
             With the valid frames as ``processed``, and the kernel's notes.
         """
+        raise NotImplementedError
 
     def gather_notes(self) -> None:
         """Take over what the stages have noted; implementers call this whenever one may have."""

@@ -18,14 +18,12 @@ from uwbbench.api.compiled import compiled, inlined
 from uwbbench_detectors.fused import layout as at
 from uwbbench_detectors.fused import short
 from uwbbench_detectors.fused.frame import FLAT, find_maxima, strongest_crest
+from uwbbench_detectors.fused.layout import NEAR
 from uwbbench_detectors.fused.place import phase_difference
 from uwbbench_detectors.fused.shape import prominence_of, prominences_of, width_of
 
 TRIED_SINGLY = 4
 """Peaks of a long frame examined by falling amplitude before all are described."""
-
-NEAR = 1e-9
-"""A decision that hangs on a logarithm or an angle closer to its limit than this is left to the plain stages."""
 
 PASSED, FAILED, UNDECIDED = 0, 1, 2
 UNCLEAR, MORE = -1, -2

@@ -14,6 +14,7 @@ import numpy as np
 
 from uwbbench.api.arrays import FloatArray, IntArray
 from uwbbench.api.compiled import compiled, inlined
+from uwbbench_detectors.fused.layout import NEAR
 
 FLAT = -2
 """In place of a tap: the profile has flat tops."""
@@ -95,7 +96,7 @@ def vertex_shift(amplitude: FloatArray, tap: int, logarithmic: bool) -> tuple[fl
     if logarithmic and left > -1 and right > -1:
         left, right = math.log1p(left), math.log1p(right)
     bend = left + right
-    close = bend != 0 and abs(bend) < 1e-9 * (abs(left) + abs(right))
+    close = bend != 0 and abs(bend) < NEAR * (abs(left) + abs(right))
     if not bend < 0:
         return 0.0, close
     return min(max(0.5 * (left - right) / bend, -0.5), 0.5), close

@@ -13,11 +13,14 @@ import numpy as np
 from uwbbench.api import Block, BoolArray, Detections, FloatArray, Frames, IntArray, Kernel, Stage
 from uwbbench_detectors.fused import layout as at
 from uwbbench_detectors.fused.chain import chain_of
-from uwbbench_detectors.noise import NoiseFloor
+from uwbbench_detectors.noise import FRAMES_TO_JUDGE, NoiseFloor
 from uwbbench_detectors.pdoa import Pdoa
 
 WORTH_SHARING = 1024
 """Frames of a block from which on threads gain more than they cost."""
+
+WORTH_A_CALL = 16
+"""Frames between two irregular ones that are searched along sooner than by a call of their own."""
 
 _NOTHING: FloatArray = np.zeros(1)
 _NO_POSES: FloatArray = np.zeros((1, 3))
@@ -49,7 +52,8 @@ class FrameSearch(Kernel):
         self._irregular = np.empty(1, np.bool_)
         self._plain = [_apart(stage) for stage in stages]
         self._noise = next((stage for stage in stages if isinstance(stage, NoiseFloor)), None)
-        self._judging = self._noise is not None and self._noise.method == "leading"
+        # The stage that still has to judge its leading taps.
+        self._judging = self._noise if self._noise is not None and self._noise.method == "leading" else None
         self._pool = ThreadPoolExecutor(threads - 1) if threads > 1 else None
 
     @classmethod
@@ -79,11 +83,11 @@ class FrameSearch(Kernel):
                 irregular,
             )
         elif self._pool is not None and self._one_a_frame and count >= WORTH_SHARING:
-            found = self._shared(frames, first_path, table, irregular)
+            found = self._shared(self._pool, frames, first_path, table, irregular)
         else:
             found = self._searched(frames, first_path, self._told, table, irregular)
-        if self._judging:
-            self._judge()
+        if self._judging is not None:
+            self._judge(self._judging)
         plainly = found < 0
         if plainly:
             found = -1 - found
@@ -136,13 +140,13 @@ class FrameSearch(Kernel):
 
     def _shared(
         self,
+        pool: ThreadPoolExecutor,
         frames: Frames,
         first_path: FloatArray | None,
         table: FloatArray,
         irregular: BoolArray,
     ) -> int:
         """Search a block with several threads, each its own part."""
-        assert self._pool is not None  # noqa: S101  (the caller asked)
         cuts = [len(frames) * part // self.threads for part in range(self.threads + 1)]
 
         def searched(start: int, stop: int, told: IntArray) -> int:
@@ -150,10 +154,10 @@ class FrameSearch(Kernel):
             part = slice(start, stop)
             return self._searched(frames.part(start, stop), path, told, table[part], irregular[part])
 
-        judged = np.array([at.FRAMES_JUDGED, 0])
-        others = [self._pool.submit(searched, *ends, judged.copy()) for ends in pairwise(cuts[1:])]
+        judged = np.array([FRAMES_TO_JUDGE, 0])
+        others = [pool.submit(searched, *ends, judged.copy()) for ends in pairwise(cuts[1:])]
         founds = [searched(cuts[0], cuts[1], self._told), *(other.result() for other in others)]
-        if self._judging and self._told[at.JUDGED] < at.FRAMES_JUDGED:
+        if self._judging is not None and self._told[at.JUDGED] < FRAMES_TO_JUDGE:
             # The first part had too few frames to judge the noise by: look at the others again, in their order.
             founds[1:] = [searched(*ends, self._told) for ends in pairwise(cuts[1:])]
         total = 0
@@ -166,14 +170,20 @@ class FrameSearch(Kernel):
     def _with_plain(
         self, found: Detections, frames: Frames, first_path: FloatArray | None, irregular: BoolArray
     ) -> Detections:
-        """Detections with those of irregular frames, which the stages themselves search one by one."""
+        """Detections with those of irregular frames, which the stages themselves search.
+
+        Frames that lie near each other are searched together, and what the stages find between them is found already.
+        """
+        rows = np.flatnonzero(irregular)
         parts = [found]
-        for row in np.flatnonzero(irregular).tolist():
-            path = None if first_path is None else first_path[row : row + 1]
-            block = Block(frames.part(row, row + 1), first_path=path)
+        for near in np.split(rows, np.flatnonzero(np.diff(rows) > WORTH_A_CALL) + 1):
+            start, stop = int(near[0]), int(near[-1]) + 1
+            path = None if first_path is None else first_path[start:stop]
+            block = Block(frames.part(start, stop).without_invalid(), first_path=path)
             for stage in self._plain:
                 block = stage.step(block)
-            parts.append(block.detections)
+            wanted = irregular[block.detections.frame - frames.first]
+            parts.append(block.detections.take(wanted))
         for stage, plain in zip(self.stages, self._plain, strict=True):
             if stage is not self._noise:  # its judgement counts every frame, and not these alone
                 for note in plain.notes:
@@ -183,11 +193,11 @@ class FrameSearch(Kernel):
         ordered = joined.take(np.argsort(joined.frame, kind="stable"))
         return ordered.annotated(processed=found.processed, notes=self.notes)
 
-    def _judge(self) -> None:
+    def _judge(self, noise: NoiseFloor) -> None:
         """Hand on what was counted of the leading taps, until the noise floor has its verdict."""
-        assert self._noise is not None  # noqa: S101  (who judges has one)
-        self._noise.tally(int(self._told[at.JUDGED]), int(self._told[at.SUSPICIOUS]))
-        self._judging = self._told[at.JUDGED] < at.FRAMES_JUDGED
+        judged = int(self._told[at.JUDGED])
+        noise.tally(judged, int(self._told[at.SUSPICIOUS]))
+        self._judging = noise if judged < FRAMES_TO_JUDGE else None
         self.gather_notes()
 
     def _read_at_same_tap(self, frames: Frames) -> None:

@@ -85,5 +85,5 @@ LIMITS = 26
 JUDGED, SUSPICIOUS = range(2)
 TOLD = 2
 
-FRAMES_JUDGED = 50
-SUSPICIOUS_RATIO = 3.0
+NEAR = 1e-9
+"""A decision that hangs on a logarithm or an angle closer to its limit than this is left to the plain stages."""

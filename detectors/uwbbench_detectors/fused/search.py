@@ -12,11 +12,12 @@ from uwbbench.api.arrays import FloatArray, IntArray
 from uwbbench.api.compiled import compiled, inlined
 from uwbbench_detectors.fused import layout as at
 from uwbbench_detectors.fused import short
-from uwbbench_detectors.fused.examine import MORE, NEAR, UNCLEAR, Signal, examine_all, examine_by_strength, examine_sets
+from uwbbench_detectors.fused.examine import MORE, UNCLEAR, Signal, examine_all, examine_by_strength, examine_sets
 from uwbbench_detectors.fused.frame import crest_tap, find_extremes, median_noise, root_mean_square, vertex_shift
 from uwbbench_detectors.fused.lanes import BLOCK, LANES, largest_of, least_of
-from uwbbench_detectors.fused.layout import HOW, LIMITS
+from uwbbench_detectors.fused.layout import HOW, LIMITS, NEAR
 from uwbbench_detectors.fused.place import azimuth_of, position_of, range_of
+from uwbbench_detectors.noise import FRAMES_TO_JUDGE, SUSPICIOUS_RATIO
 
 as_tuple: Any = to_fixed_tuple
 """Settings as values of their own: those of an array are read anew after whatever is written to any array."""
@@ -38,7 +39,7 @@ def _judge(amplitude: FloatArray, how: IntArray, told: IntArray) -> None:
     taps = how[at.NOISE_TAPS]
     tail = root_mean_square(amplitude, len(amplitude) - taps, len(amplitude))
     told[at.JUDGED] += 1
-    told[at.SUSPICIOUS] += root_mean_square(amplitude, 0, taps) > at.SUSPICIOUS_RATIO * tail
+    told[at.SUSPICIOUS] += root_mean_square(amplitude, 0, taps) > SUSPICIOUS_RATIO * tail
 
 
 @inlined
@@ -149,7 +150,7 @@ def search(
     order : (columns,) int array
         Which of all columns are written, in this order.
     told : (TOLD,) int array
-        Frames judged and suspicious so far, which are counted on up to FRAMES_JUDGED.
+        Frames judged and suspicious so far, which are counted on up to FRAMES_TO_JUDGE.
     table : (rows, 1 + columns) array
         Written: the detections, by frame and then tap; the first column holds the bits of the index of the frame.
     irregular : (frames,) bool array
@@ -194,7 +195,7 @@ def search(
             for tap in range(start):
                 highest = max(highest, amplitude[tap])
         regular = highest < np.inf
-        if how[at.NOISE] == at.NOISE_LEADING and told[at.JUDGED] < at.FRAMES_JUDGED and regular and highest > 0:
+        if how[at.NOISE] == at.NOISE_LEADING and told[at.JUDGED] < FRAMES_TO_JUDGE and regular and highest > 0:
             _judge(amplitude, how, told)
         if scaled and regular and not short.scale(strengths_room, stop, low, high, heights_room):
             continue
@@ -257,7 +258,7 @@ def search_alone(
     table: FloatArray,
     irregular: Any,
 ) -> int:
-    """Search where nothing but the samples is needed: handing over fewer arrays saves a third of a short call."""
+    """Search where nothing but the samples is needed: a short call is cheaper with fewer arrays to hand over."""
     anything = limits
     return search(
         samples,

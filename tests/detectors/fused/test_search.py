@@ -234,6 +234,16 @@ def test_threads_leave_frames_that_rounding_could_decide_to_the_plain_stages():
     assert_same(detector.run(capture, threads=2), detector.run(capture, fused=False))
 
 
+@pytest.mark.parametrize("every", [1, 2, 5, 40])
+def test_frames_without_noise_among_others_and_among_invalid_ones_are_found_alike(every):
+    samples = responses(8, "echoes", frames=300)
+    samples[::every, :4] = 0
+    samples[3::11, 5] = np.nan
+    capture = captured(samples)
+    detector = load_detector("paper-filtering")
+    assert_same(detector.run(capture), detector.run(capture, fused=False))
+
+
 def test_samples_that_may_not_be_written_to_or_lie_apart_are_searched_alike():
     samples = responses(3, "echoes", frames=40)
     usual = load_detector("paper-filtering").run(captured(samples))
