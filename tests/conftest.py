@@ -7,16 +7,17 @@ from pathlib import Path
 
 import pytest
 
-from uwbbench import registry
-from uwbbench.api import Capture
-from uwbbench.registry import load
+from uwbbench.api import Capture, registry
+from uwbbench.api.registry import load_plugin
+
+pytest_plugins = ["tests.fixtures.runs", "tests.fixtures.contributions"]
 
 _DATA = Path(os.environ.get("UWBBENCH_DATA", Path(__file__).parents[2] / "shared" / "data"))
 
 
 def simulated_approach(**params: object) -> Capture:
     """One run of the built-in simulated approach."""
-    adapter = load("datasets", "approach")
+    adapter = load_plugin("datasets", "approach")
     dataset = adapter(adapter.params_type().model_validate(params), ())
     return dataset.open(dataset.names()[0])
 
@@ -46,7 +47,7 @@ def install_plugin(tmp_path, monkeypatch):
     """Install a small distribution: ``install_plugin("name", {"stages": {...}}, {"module.py": source})``."""
 
     def forget() -> None:
-        for known in (registry.entries, registry.load):
+        for known in (registry.entries, registry.load_plugin):
             known.cache_clear()
         importlib.invalidate_caches()
 

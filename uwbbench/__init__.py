@@ -16,9 +16,9 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from uwbbench.api.capture_file import open_capture, write_capture
-    from uwbbench.calibration import calibrate
-    from uwbbench.pipeline import load_detector
-    from uwbbench.scoring import score
+    from uwbbench.detect.pipeline import load_detector
+    from uwbbench.measure.accuracy.scoring import score
+    from uwbbench.measure.calibration import calibrate
 
 __version__ = "0.1.0"
 __all__ = ["__version__", "calibrate", "load_detector", "open_capture", "score", "write_capture"]
@@ -26,9 +26,9 @@ __all__ = ["__version__", "calibrate", "load_detector", "open_capture", "score",
 _HOME = {
     "open_capture": "uwbbench.api.capture_file",
     "write_capture": "uwbbench.api.capture_file",
-    "calibrate": "uwbbench.calibration",
-    "load_detector": "uwbbench.pipeline",
-    "score": "uwbbench.scoring",
+    "calibrate": "uwbbench.measure.calibration",
+    "load_detector": "uwbbench.detect.pipeline",
+    "score": "uwbbench.measure.accuracy.scoring",
 }
 
 

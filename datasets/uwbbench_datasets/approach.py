@@ -12,6 +12,7 @@ from pydantic import Field
 from scipy.special import fresnel
 
 from uwbbench.api import (
+    CHANNEL_CENTER_HZ,
     SPEED_OF_LIGHT_M_S,
     Capture,
     CaptureError,
@@ -26,7 +27,6 @@ from uwbbench.api import (
     Truth,
     nearest,
 )
-from uwbbench.api.radar import CHANNEL_CENTER_HZ
 
 SAMPLE_INTERVAL_S = 1 / (2 * 499.2e6)
 REFLECTION = {"metal": 1.0, "concrete": 0.394 / 2, "plywood": 0.26 / 1.41}

@@ -10,8 +10,7 @@ from typing import ClassVar
 
 from pydantic import Field
 
-from uwbbench.api import Capture, CaptureError, Card, Dataset, Params, nearest, open_capture
-from uwbbench.api.capture_file import list_receivers
+from uwbbench.api import Capture, CaptureError, Card, Dataset, Params, list_receivers, nearest, open_capture
 
 
 def find_files(patterns: Iterable[str], folders: Sequence[Path]) -> list[Path]:

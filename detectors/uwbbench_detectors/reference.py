@@ -5,8 +5,20 @@ from __future__ import annotations
 import numpy as np
 from pydantic import Field
 
-from uwbbench.api import Block, Detections, FloatArray, IntArray, Params, Radar, Stage, Trajectory, Truth, ports
-from uwbbench.api.geometry import receiver_pose, to_world
+from uwbbench.api import (
+    Block,
+    Detections,
+    FloatArray,
+    IntArray,
+    Params,
+    Radar,
+    Stage,
+    Trajectory,
+    Truth,
+    ports,
+    receiver_pose,
+    to_world,
+)
 
 _PRODUCED = ports("detections", "range_m", "azimuth_rad", "amplitude", "x_m", "y_m")
 

@@ -15,12 +15,12 @@ import click
 import typer
 from sphinx.application import Sphinx
 
-from uwbbench import registry
+from uwbbench.api import registry
+from uwbbench.api.locate import shipped
 from uwbbench.api.stage import describe
 from uwbbench.cli import app as program
 from uwbbench.cli.describe import parameters
-from uwbbench.config.locate import shipped
-from uwbbench.pipeline import load_detector
+from uwbbench.detect.pipeline import load_detector
 
 MARK = re.compile(r"<!-- generated: ([a-z]+) -->")
 
@@ -46,7 +46,7 @@ def _commands() -> Iterator[str]:
 def _stages() -> Iterator[str]:
     """Every stage with its ports and parameters."""
     for name in sorted(registry.entries("stages")):
-        stage = registry.load("stages", name)
+        stage = registry.load_plugin("stages", name)
         yield from (f"## {name}", "", _plain(describe(stage)), "")
         for port in ("needs", "consumes", "produces"):
             if getattr(stage, port):
@@ -57,7 +57,7 @@ def _stages() -> Iterator[str]:
 def _datasets() -> Iterator[str]:
     """Every dataset with its card and parameters."""
     for name in sorted(registry.entries("datasets")):
-        adapter = registry.load("datasets", name)
+        adapter = registry.load_plugin("datasets", name)
         card = adapter.card
         yield from (f"## {name}", "", _plain(describe(adapter)), "")
         yield from (f"* {card.origin}, licence {_plain(card.license)}", f"* {_plain(card.citation or card.title)}", "")
@@ -67,7 +67,7 @@ def _datasets() -> Iterator[str]:
 def _terms() -> Iterator[str]:
     """Every term of the simulator with its parameters."""
     for name in sorted(registry.entries("terms")):
-        term = registry.load("terms", name)
+        term = registry.load_plugin("terms", name)
         yield from (f"## {name}", "", _plain(describe(term)), "", *_table(term), "")
 
 

@@ -14,11 +14,11 @@ import numpy as np
 import pytest
 
 from uwbbench.api import ConfigError, compiled_files
-from uwbbench.api.compiled import compile_counts, compiled
+from uwbbench.api.compiling import compile_counts, compiled
 
 SOURCE = """\
 import numpy as np
-from uwbbench.api.compiled import compiled
+from uwbbench.api.compiling import compiled
 
 SCALE = 2.0
 
@@ -177,7 +177,7 @@ def test_where_nothing_can_be_written_functions_still_run_with_one_warning(
 READ_ONLY = """\
 import os, sys
 import numpy as np
-from uwbbench.api.compiled import compile_counts, compiled
+from uwbbench.api.compiling import compile_counts, compiled
 
 assert compiled(lambda x: x + 1)(1) == 2  # numba is loaded, which another user may not be allowed to
 if os.geteuid() == 0:
@@ -210,7 +210,7 @@ def test_a_prepared_read_only_installation_is_used_by_another_user() -> None:
 
 def test_cold_processes_that_start_at_once_all_succeed(source: Path, tmp_path: Path) -> None:
     script = (
-        "import kernels, numpy as np\nfrom uwbbench.api.compiled import compile_counts\n"
+        "import kernels, numpy as np\nfrom uwbbench.api.compiling import compile_counts\n"
         "kinds = [np.float64, np.float32, np.int64, np.complex64]\n"
         "print([complex(kernels.total(np.arange(5).astype(kind))) for kind in kinds])\n"
         "print(compile_counts().fresh)"
@@ -248,7 +248,7 @@ def test_a_changed_source_is_compiled_again_and_what_was_kept_of_it_removed(sour
 CALLER = """\
 import {module} as other
 from {module} import LIMIT, add
-from uwbbench.api.compiled import compiled
+from uwbbench.api.compiling import compiled
 
 
 @compiled
@@ -261,7 +261,7 @@ def dotted(x):
     return other.add(x) + other.LIMIT
 """
 CALLEE = """\
-from uwbbench.api.compiled import compiled
+from uwbbench.api.compiling import compiled
 
 LIMIT = 10.0
 
@@ -292,7 +292,7 @@ def test_a_change_in_a_module_that_is_called_or_read_is_noticed(
 def test_another_processor_does_not_load_this_ones_machine_code(source: Path) -> None:
     imported(source).total(VALUES)
     script = (
-        "import kernels, numpy as np\nfrom uwbbench.api.compiled import compile_counts\n"
+        "import kernels, numpy as np\nfrom uwbbench.api.compiling import compile_counts\n"
         "print(kernels.total(np.arange(5.0)), compile_counts().fresh)"
     )
     places = {**os.environ, "PYTHONPATH": str(source.parent), "NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": ""}

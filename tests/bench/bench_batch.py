@@ -31,8 +31,8 @@ from harness import (
 )
 
 from uwbbench.api import Capture, Detections, FloatArray, Frames
-from uwbbench.pipeline import BATCH_FRAMES, Pipeline, load_detector
-from uwbbench.timing.loops import cut
+from uwbbench.detect.pipeline import BATCH_FRAMES, Pipeline, load_detector
+from uwbbench.measure.latency.loops import cut
 
 FRAME_COUNTS = (1_000, 10_000, 100_000, 1_000_000)
 TAP_COUNTS = (50, 100, 200, 400, 1016)

@@ -15,8 +15,8 @@ import numpy as np
 from harness import Disagreement, Effort, Row, Run, interleaved, median, ratio, told
 
 from uwbbench.api import Block, ComplexArray, Frames, Radar, Stage
-from uwbbench.registry import load
-from uwbbench_detectors.cfar_factors import TrainingWindow, order_rank, threshold_factor
+from uwbbench.api.registry import load_plugin
+from uwbbench_detectors.cfar.factors import TrainingWindow, order_rank, threshold_factor
 
 HALF, GUARD, RATE, RANK = 6, 2, 1e-3, 0.75
 MEMORY = 0.97
@@ -129,7 +129,7 @@ def check(name: str, expected: Any, block: Block) -> None:
 
 def stage(name: str, radar: Radar, params: dict[str, Any]) -> Stage[Any]:
     """An opened stage."""
-    cls = load("stages", name)
+    cls = load_plugin("stages", name)
     opened: Stage[Any] = cls(cls.params_type().model_validate(params))
     opened.open(radar)
     return opened

@@ -14,7 +14,7 @@ import frames as made
 from harness import Effort, Row, alone, at_most, once, told
 
 from uwbbench.api.capture_file import open_capture, write_capture
-from uwbbench.pipeline import BATCH_FRAMES, load_detector
+from uwbbench.detect.pipeline import BATCH_FRAMES, load_detector
 
 FRAMES = 1_000_000
 DISTINCT = 20_000

@@ -26,13 +26,13 @@ import waiting
 
 from uwbbench.api import write_capture
 from uwbbench.config.source import CaptureRef, open_dataset
-from uwbbench.gate.check import Verdict
-from uwbbench.gate.config import LatencyGateModel, Side
-from uwbbench.gate.latency import checks_within, turn_size
-from uwbbench.gate.link import Worker, join, worker_of
-from uwbbench.gate.ratio import Ratio
-from uwbbench.stats import clopper_pearson
-from uwbbench.timing.machine import load
+from uwbbench.measure.accuracy.stats import clopper_pearson
+from uwbbench.measure.latency.machine import load
+from uwbbench.tools.gate.check import Verdict
+from uwbbench.tools.gate.config import LatencyGateModel, Side
+from uwbbench.tools.gate.latency import checks_within, turn_size
+from uwbbench.tools.gate.link import Worker, join, worker_of
+from uwbbench.tools.gate.ratio import Ratio
 
 GATES = 100
 SLOWDOWN = 0.10

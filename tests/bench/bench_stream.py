@@ -29,10 +29,10 @@ from harness import (
 )
 
 from uwbbench.api import Capture, Detections, FloatArray, Frames
-from uwbbench.pipeline import Pipeline, Stream, load_detector
-from uwbbench.timing.loops import call_times_us, cut, endless, warm_up
-from uwbbench.timing.memory import resident_bytes
-from uwbbench.timing.paced import paced_pass, responses_us
+from uwbbench.detect.pipeline import Pipeline, Stream, load_detector
+from uwbbench.measure.latency.loops import call_times_us, cut, endless, warm_up
+from uwbbench.measure.latency.memory import resident_bytes
+from uwbbench.measure.latency.paced import paced_pass, responses_us
 
 PERIOD_US = 1e6 / made.FRAME_RATE_HZ
 LONG_STREAM = 100_000

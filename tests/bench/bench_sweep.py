@@ -15,10 +15,10 @@ import numpy as np
 from harness import Disagreement, Effort, Row, Run, at_least, at_most, interleaved, median, ratio, told
 
 from uwbbench.api import Capture, FloatArray
-from uwbbench.pipeline import Pipeline, load_detector
-from uwbbench.sweep.scores import SetScores, set_scores
-from uwbbench.sweep.sweep import Sweep, Swept
-from uwbbench.verdict import ScoringRules
+from uwbbench.detect.pipeline import Pipeline, load_detector
+from uwbbench.measure.accuracy.judge import ScoringRules
+from uwbbench.tools.tune.sweep.scores import SetScores, set_scores
+from uwbbench.tools.tune.sweep.sweep import Sweep, Swept
 
 FRAMES, SCRIPT_FRAMES, DETECTOR_SETS = 10_000, 1_000, 4
 CHANNEL = 9

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from uwbbench.api import Capture, ComplexArray, FloatArray, Radar, Samples, Trajectory
-from uwbbench.registry import load
+from uwbbench.api.registry import load_plugin
 from uwbbench_datasets.simulator.engine import simulate
 from uwbbench_datasets.simulator.scene import read_scenes
 
@@ -28,7 +28,7 @@ def approach(frames: int = FRAMES, *, channel: int = 9, sts: bool = True, seed: 
     """The built-in simulated approach to a metal plate, slow enough to last for so many frames (50 taps)."""
     speed_m_s = 2.8 * FRAME_RATE_HZ / (frames - 0.5)
     changes = {"channel": channel, "sts": sts, "seed": seed, "speed_m_s": speed_m_s, "frame_rate_hz": FRAME_RATE_HZ}
-    adapter = load("datasets", "approach")
+    adapter = load_plugin("datasets", "approach")
     dataset = adapter(adapter.params_type().model_validate(changes), ())
     return dataset.open(dataset.names()[0])
 

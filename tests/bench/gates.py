@@ -11,8 +11,8 @@ import bench_gate
 import numpy as np
 from harness import Effort, Interval, Row, at_least, at_most
 
-from uwbbench.gate.check import Verdict
-from uwbbench.stats import clopper_pearson
+from uwbbench.measure.accuracy.stats import clopper_pearson
+from uwbbench.tools.gate.check import Verdict
 
 
 def rows(effort: Effort) -> Iterator[Row]:

@@ -9,7 +9,7 @@ import sys
 
 from harness import Disagreement, Effort, heading, line, plain
 
-from uwbbench.timing.machine import load, machine
+from uwbbench.measure.latency.machine import load, machine
 
 PARTS = {
     "batch": "bench_batch",

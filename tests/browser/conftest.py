@@ -11,10 +11,10 @@ from typing import Any
 
 import pytest
 
-from uwbbench.report import Report
-from uwbbench.report.page import Content, page
+from uwbbench.results import Report
 from uwbbench.run import run_experiment
 from uwbbench.run.experiment import read_experiment
+from uwbbench.show.page import Content, page
 
 FLAGS = (
     "--headless",

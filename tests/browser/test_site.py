@@ -4,7 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from uwbbench.leaderboard import Content, read_runs, rendered, suites, write_site
+from uwbbench.results.leaderboard import read_runs, suites
+from uwbbench.show.site import Content, rendered, write_site
 
 pytestmark = pytest.mark.browser
 

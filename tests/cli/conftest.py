@@ -12,8 +12,8 @@ import pytest
 from typer.testing import CliRunner
 
 from uwbbench.api import Capture, Trajectory, write_capture
+from uwbbench.api.registry import load_plugin
 from uwbbench.cli import app
-from uwbbench.registry import load
 
 SIMPLE_DETECTOR = """\
 schema: 1
@@ -60,7 +60,7 @@ def shell(tmp_path: Path) -> Callable[..., subprocess.CompletedProcess[str]]:
 
 def small_approach(**changes: object) -> Capture:
     """Forty frames of the simulated approach, in memory."""
-    adapter = load("datasets", "approach")
+    adapter = load_plugin("datasets", "approach")
     params = adapter.params_type().model_validate({"start_m": 2.0, "stop_m": 1.2, "speed_m_s": 1.0, **changes})
     dataset = adapter(params, ())
     return dataset.open(dataset.names()[0])

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import uwbbench as package
-from uwbbench.registry import load
+from uwbbench.api.registry import load_plugin
 
 MAPPING = """\
 schema: 1
@@ -21,7 +21,7 @@ preamble: {i: "re{tap}", q: "im{tap}"}
 
 def test_convert_writes_what_the_adapter_reads(uwbbench, tmp_path: Path) -> None:
     uwbbench("convert", ".", "--dataset", "approach", "--set", "channel=5", "-o", "new/folder/plate.h5")
-    adapter = load("datasets", "approach")
+    adapter = load_plugin("datasets", "approach")
     expected = adapter(adapter.params_type()(channel=5), ()).open("approach-ch5-metal-1")
     assert package.open_capture(tmp_path / "new/folder/plate.h5").sha256 == expected.sha256
 

@@ -8,8 +8,7 @@ from xml.etree import ElementTree as ET
 import pytest
 import waiting
 
-from uwbbench import registry
-from uwbbench.api import write_capture
+from uwbbench.api import registry, write_capture
 from uwbbench.config.source import open_dataset
 from uwbbench.run import run_experiment
 from uwbbench.run.experiment import read_experiment
@@ -37,10 +36,10 @@ def stages(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     waiting.install(tmp_path / "site")
     monkeypatch.syspath_prepend(tmp_path / "site")
     monkeypatch.setenv("PYTHONPATH", str(tmp_path / "site"))
-    for known in (registry.entries, registry.load):
+    for known in (registry.entries, registry.load_plugin):
         known.cache_clear()
     yield
-    for known in (registry.entries, registry.load):
+    for known in (registry.entries, registry.load_plugin):
         known.cache_clear()
 
 

@@ -7,8 +7,8 @@ from pathlib import Path
 import h5py
 import pytest
 
-from uwbbench.config.locate import shipped
-from uwbbench.pipeline import load_detector
+from uwbbench.api.locate import shipped
+from uwbbench.detect.pipeline import load_detector
 
 # list
 
@@ -42,7 +42,7 @@ def test_list_of_an_unknown_kind_names_the_kinds(uwbbench) -> None:
 
 
 def test_tables_in_a_pipe_are_not_cut_off(uwbbench) -> None:
-    assert "uwbbench_detectors.first_path:LeadingEdgeFirstPath" in uwbbench("list", "stages").stdout
+    assert "uwbbench_detectors.first_path.estimators:LeadingEdgeFirstPath" in uwbbench("list", "stages").stdout
 
 
 # show

@@ -2,7 +2,7 @@ import sys
 
 import pytest
 
-from uwbbench.plot.draw import KINDS
+from uwbbench.show.figures.draw import KINDS
 
 TINY_RUN = """\
 schema: 1

@@ -10,11 +10,11 @@ import pytest
 import typer.main
 
 from uwbbench.api import Block
+from uwbbench.api.locate import config_folder, shipped
 from uwbbench.api.yaml_file import parse_yaml
 from uwbbench.cli import app
-from uwbbench.config.locate import config_folder, shipped
-from uwbbench.pipeline import detector_from_yaml
-from uwbbench.schema import experiment_schema
+from uwbbench.detect.pipeline import detector_from_yaml
+from uwbbench.tools.schema import experiment_schema
 
 _README = Path(__file__).parents[2] / "README.md"
 

@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from uwbbench.checks import all_checks
+from uwbbench.tools.check import all_checks
 
 BROKEN = """\
 from uwbbench.api import Params, Stage, ports

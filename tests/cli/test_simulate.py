@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from uwbbench.api import open_capture
-from uwbbench.config.locate import config_folder
+from uwbbench.api.locate import config_folder
 
 SCENE = """\
 schema: 1

@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from uwbbench.stability import all_cases
+from uwbbench.measure.robustness import all_cases
 
 BLIND = """\
 schema: 1

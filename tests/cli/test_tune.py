@@ -8,7 +8,7 @@ import pyarrow.parquet as pq
 import pytest
 import yaml
 
-from uwbbench.pipeline import load_detector
+from uwbbench.detect.pipeline import load_detector
 
 TUNE = """\
 schema: 1

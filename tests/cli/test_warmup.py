@@ -20,7 +20,7 @@ YAML = "schema: 1\nname: broken\npipeline:\n  - {use: broken}\n"
 
 def test_a_second_process_loads_what_the_first_compiled(shell, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "kernels.py").write_text(
-        "from uwbbench.api.compiled import compiled\n\n\n@compiled\ndef first(samples):\n    return samples[0, 0]\n"
+        "from uwbbench.api.compiling import compiled\n\n\n@compiled\ndef first(samples):\n    return samples[0, 0]\n"
     )
     (tmp_path / "stages.py").write_text(
         "from uwbbench.api import Stage, ports\n\n\nclass First(Stage):\n    produces = ports('detections')\n\n"

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from uwbbench.api import ConfigError, PluginError
-from uwbbench.config.locate import config_folder, find_config
+from uwbbench.api.locate import config_folder, find_config
 from uwbbench.config.source import CaptureRef, data_roots, open_dataset
 
 

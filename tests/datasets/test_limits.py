@@ -7,7 +7,7 @@ from numpy.testing import assert_allclose
 from uwbbench.api import SPEED_OF_LIGHT_M_S, Capture, ConfigError
 from uwbbench.config.detector import read_detector
 from uwbbench.config.source import open_dataset
-from uwbbench.pipeline import Pipeline
+from uwbbench.detect.pipeline import Pipeline
 from uwbbench_datasets.limits import CREST_TAP, PULSE, SAMPLE_INTERVAL_S
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from uwbbench.api import Block, Frames, Radar, Stage
-from uwbbench.registry import load
+from uwbbench.api.registry import load_plugin
 
 Maker = Callable[..., Any]
 
@@ -47,7 +47,7 @@ def build_block(samples: Any, **parts: Any) -> Block:
 
 def build_stage(name: str, **params: Any) -> Stage[Any]:
     """A registered stage with these parameters."""
-    cls = load("stages", name)
+    cls = load_plugin("stages", name)
     return cls(cls.params_type().model_validate(params))
 
 

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from uwbbench import registry
-from uwbbench.config.locate import shipped
+from uwbbench.api import registry
+from uwbbench.api.locate import shipped
 
 DOCS = Path(__file__).parents[2] / "docs"
 ADDRESS = re.compile(

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from joblib.externals.loky import get_reusable_executor
 
-from uwbbench import registry
+from uwbbench.api import registry
 from uwbbench.run.experiment import Experiment, read_experiment
 
 MISBEHAVING = '''
@@ -84,11 +84,11 @@ def misbehaving(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Pat
     monkeypatch.syspath_prepend(site)
     monkeypatch.setenv("PYTHONPATH", str(site))
     registry.entries.cache_clear()
-    registry.load.cache_clear()
+    registry.load_plugin.cache_clear()
     get_reusable_executor().shutdown(wait=True)  # idle workers of an earlier test know nothing of the package
     yield site
     registry.entries.cache_clear()
-    registry.load.cache_clear()
+    registry.load_plugin.cache_clear()
     get_reusable_executor().shutdown(wait=True)
 
 

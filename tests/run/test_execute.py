@@ -10,11 +10,11 @@ import pandas as pd
 import pytest
 
 from uwbbench.api import StoreError
-from uwbbench.pipeline import load_detector
+from uwbbench.detect.pipeline import load_detector
+from uwbbench.measure.accuracy.scoring import Region, ScoringRules, score
 from uwbbench.run import Progress, rescore, run_experiment
 from uwbbench.run.experiment import Experiment
-from uwbbench.scoring import Region, ScoringRules, score
-from uwbbench.store import RunFolder
+from uwbbench.run.folder import RunFolder
 
 MakeExperiment = Callable[..., Experiment]
 DetectorFile = Callable[..., Path]

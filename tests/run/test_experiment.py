@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from uwbbench.api import ConfigError, PluginError, UwbbenchError
-from uwbbench.config.locate import shipped
+from uwbbench.api.locate import shipped
 from uwbbench.run.experiment import read_experiment
 
 SMALL = """\

@@ -16,7 +16,7 @@ import pytest
 from uwbbench.api import StoreError, write_capture
 from uwbbench.run import Interrupted, Progress, run_experiment
 from uwbbench.run.experiment import Experiment
-from uwbbench.store import RunFolder
+from uwbbench.run.folder import RunFolder
 
 MakeExperiment = Callable[..., Experiment]
 DetectorFile = Callable[..., Path]

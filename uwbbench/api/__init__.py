@@ -12,8 +12,9 @@ if TYPE_CHECKING:
     from uwbbench.api.arrays import BoolArray, ComplexArray, FloatArray, IntArray
     from uwbbench.api.block import Block
     from uwbbench.api.capture import Capture, CaptureHeader, Samples, analytic
-    from uwbbench.api.capture_file import open_capture, write_capture
+    from uwbbench.api.capture_file import list_receivers, open_capture, write_capture
     from uwbbench.api.check import checked
+    from uwbbench.api.compiling import compiled, inlined
     from uwbbench.api.dataset import Card, Dataset, DatasetFile
     from uwbbench.api.detections import COLUMNS, Detections
     from uwbbench.api.errors import (
@@ -25,12 +26,27 @@ if TYPE_CHECKING:
         UwbbenchError,
         nearest,
     )
+    from uwbbench.api.filters import Limit, LimitFilter, RankFilter, RankParams
     from uwbbench.api.frames import Frames, magnitude
-    from uwbbench.api.geometry import SPEED_OF_LIGHT_M_S
+    from uwbbench.api.geometry import (
+        SPEED_OF_LIGHT_M_S,
+        bistatic_range,
+        bistatic_range_sine,
+        direction,
+        nearest_on_outline,
+        receiver_pose,
+        rotate_z,
+        segments_cross,
+        to_world,
+        wrap_angle,
+    )
     from uwbbench.api.kernel import Kernel
+    from uwbbench.api.locate import find_config
     from uwbbench.api.metric import Metric, Outcome
-    from uwbbench.api.radar import Radar
-    from uwbbench.api.stage import Filter, Params, Stage, ports
+    from uwbbench.api.override import with_values
+    from uwbbench.api.radar import CHANNEL_CENTER_HZ, Radar
+    from uwbbench.api.registry import load_plugin
+    from uwbbench.api.stage import Filter, P, Params, Stage, ports
     from uwbbench.api.term import Paths, Pulse, Responses, SceneObject, Term, View
     from uwbbench.api.truth import Obstacle, Sight, Trajectory, Truth
     from uwbbench.api.yaml_file import YamlFile, read_yaml
@@ -39,25 +55,33 @@ _HOME = {
     "arrays": ("BoolArray", "ComplexArray", "FloatArray", "IntArray"),
     "block": ("Block",),
     "capture": ("Capture", "CaptureHeader", "Samples", "analytic"),
-    "capture_file": ("open_capture", "write_capture"),
+    "capture_file": ("list_receivers", "open_capture", "write_capture"),
     "check": ("checked",),
+    "compiling": ("compiled", "inlined"),
     "dataset": ("Card", "Dataset", "DatasetFile"),
     "detections": ("COLUMNS", "Detections"),
-    "errors": (
-        "CaptureError",
-        "ConfigError",
-        "PluginError",
-        "ScoringError",
-        "StoreError",
-        "UwbbenchError",
-        "nearest",
-    ),
+    "errors": ("CaptureError", "ConfigError", "PluginError", "ScoringError", "StoreError", "UwbbenchError", "nearest"),
+    "filters": ("Limit", "LimitFilter", "RankFilter", "RankParams"),
     "frames": ("Frames", "magnitude"),
-    "geometry": ("SPEED_OF_LIGHT_M_S",),
+    "geometry": (
+        "SPEED_OF_LIGHT_M_S",
+        "bistatic_range",
+        "bistatic_range_sine",
+        "direction",
+        "nearest_on_outline",
+        "receiver_pose",
+        "rotate_z",
+        "segments_cross",
+        "to_world",
+        "wrap_angle",
+    ),
     "kernel": ("Kernel",),
+    "locate": ("find_config",),
     "metric": ("Metric", "Outcome"),
-    "radar": ("Radar",),
-    "stage": ("Filter", "Params", "Stage", "ports"),
+    "override": ("with_values",),
+    "radar": ("CHANNEL_CENTER_HZ", "Radar"),
+    "registry": ("load_plugin",),
+    "stage": ("Filter", "P", "Params", "Stage", "ports"),
     "term": ("Paths", "Pulse", "Responses", "SceneObject", "Term", "View"),
     "truth": ("Obstacle", "Sight", "Trajectory", "Truth"),
     "yaml_file": ("YamlFile", "read_yaml"),
@@ -65,6 +89,7 @@ _HOME = {
 _MODULE_OF = {name: module for module, names in _HOME.items() for name in names}
 
 __all__ = [
+    "CHANNEL_CENTER_HZ",
     "COLUMNS",
     "SPEED_OF_LIGHT_M_S",
     "Block",
@@ -83,14 +108,19 @@ __all__ = [
     "Frames",
     "IntArray",
     "Kernel",
+    "Limit",
+    "LimitFilter",
     "Metric",
     "Obstacle",
     "Outcome",
+    "P",
     "Params",
     "Paths",
     "PluginError",
     "Pulse",
     "Radar",
+    "RankFilter",
+    "RankParams",
     "Responses",
     "Samples",
     "SceneObject",
@@ -105,12 +135,27 @@ __all__ = [
     "View",
     "YamlFile",
     "analytic",
+    "bistatic_range",
+    "bistatic_range_sine",
     "checked",
+    "compiled",
+    "direction",
+    "find_config",
+    "inlined",
+    "list_receivers",
+    "load_plugin",
     "magnitude",
     "nearest",
+    "nearest_on_outline",
     "open_capture",
     "ports",
     "read_yaml",
+    "receiver_pose",
+    "rotate_z",
+    "segments_cross",
+    "to_world",
+    "with_values",
+    "wrap_angle",
     "write_capture",
 ]
 

@@ -89,7 +89,7 @@ class CaptureHeader:
         return f"{type(self).__name__}({self.name!r}, {self.source}: {size})"
 
     def _repr_html_(self) -> str:
-        return str(import_module("uwbbench.display").capture(self))
+        return str(import_module("uwbbench.show.notebook").capture(self))
 
     @property
     def duration_s(self) -> float:

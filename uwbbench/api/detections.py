@@ -169,7 +169,7 @@ class Detections:
         return f"Detections({len(self)} in {len(self.processed)} frames: {', '.join(self.columns)})"
 
     def _repr_html_(self) -> str:
-        return str(import_module("uwbbench.display").detections(self))
+        return str(import_module("uwbbench.show.notebook").detections(self))
 
     def __contains__(self, column: str) -> bool:
         return column in self.columns

@@ -99,7 +99,7 @@ class Truth:
         return f"Truth({len(self.objects)} objects, {'exhaustive' if self.exhaustive else 'not exhaustive'})"
 
     def _repr_html_(self) -> str:
-        return str(import_module("uwbbench.display").truth(self))
+        return str(import_module("uwbbench.show.notebook").truth(self))
 
     def seen_from(self, radar: Radar, trajectory: Trajectory) -> Sight:
         """Range and azimuth of every object from every pose of the receiver.

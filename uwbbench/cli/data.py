@@ -64,8 +64,8 @@ def _file_part(name: str) -> str:
 
 def _open(source: Path, name: str, settings: list[str] | None) -> Dataset[Any]:
     """Adapter that reads a recording from its own folder and nowhere else."""
-    from uwbbench import registry
-    from uwbbench.config.override import parse_settings
+    from uwbbench.api import registry
+    from uwbbench.api.override import parse_settings
     from uwbbench.config.source import open_dataset
 
     if not source.exists():
@@ -73,7 +73,7 @@ def _open(source: Path, name: str, settings: list[str] | None) -> Dataset[Any]:
     folder = source.resolve() if source.is_dir() else source.resolve().parent
     params = parse_settings(settings or ())
     if source.is_file():
-        adapter = registry.load("datasets", name)
+        adapter = registry.load_plugin("datasets", name)
         fields = adapter.params_type().model_fields
         if "mapping" in fields and source.suffix in (".yaml", ".yml"):
             params.setdefault("mapping", source.name)
@@ -94,12 +94,12 @@ def fetch(
     ] = None,
 ) -> None:
     """Download a published dataset. It is checked against its hashes."""
-    import uwbbench.fetch
+    import uwbbench.tools.fetch
 
     def tell(file: Any, done: int, count: int) -> None:
         typer.echo(f"{done + 1}/{count} {file.path}", err=True)
 
-    typer.echo(uwbbench.fetch.fetch(dataset, folder, tell))
+    typer.echo(uwbbench.tools.fetch.fetch(dataset, folder, tell))
 
 
 def register(app: typer.Typer) -> None:

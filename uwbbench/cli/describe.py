@@ -6,10 +6,10 @@ import inspect
 from pathlib import Path
 from typing import Any
 
-from uwbbench import registry
+from uwbbench.api import registry
 from uwbbench.api.errors import ConfigError, PluginError, nearest
+from uwbbench.api.locate import find_config, shipped
 from uwbbench.api.yaml_file import read_yaml
-from uwbbench.config.locate import find_config, shipped
 
 _CLASSES = ("stages", "datasets", "metrics", "terms")
 
@@ -36,7 +36,7 @@ def everything_named(name: str) -> dict[str, dict[str, Any]]:
 
 
 def _plugin(kind: Any, name: str) -> dict[str, Any]:
-    cls, entry = registry.load(kind, name), registry.entry(kind, name)
+    cls, entry = registry.load_plugin(kind, name), registry.entry(kind, name)
     facts: dict[str, Any] = {"package": entry.package, "target": entry.target, "doc": inspect.getdoc(cls) or ""}
     if kind == "stages":
         facts["fidelity"] = cls.fidelity
@@ -97,7 +97,7 @@ def _type_text(field: dict[str, Any], definitions: dict[str, Any]) -> str:
 
 
 def _detector(name: str) -> dict[str, Any]:
-    from uwbbench.pipeline import load_detector
+    from uwbbench.detect.pipeline import load_detector
 
     config = load_detector(name).config
     about = {"description": config.description, "citation": config.citation, **config.to_dict()}
@@ -127,7 +127,7 @@ def _without_defaults(step: dict[str, Any]) -> dict[str, Any]:
 def capture_file(path: Path) -> dict[str, Any]:
     """Facts about every receiver of a capture file; all samples are read once, to count invalid frames."""
     from uwbbench.api.capture_file import list_receivers, open_capture
-    from uwbbench.store.identity import plain
+    from uwbbench.run.folder.identity import plain
 
     captures = [open_capture(path, name) for name in list_receivers(path)]
     first = captures[0]
@@ -208,10 +208,10 @@ def checked_file(path: Path) -> str:
         If it is wrong, or none of the five.
     """
     from uwbbench.config.source import open_dataset
-    from uwbbench.gate import read_gate
-    from uwbbench.pipeline import load_detector
+    from uwbbench.detect.pipeline import load_detector
     from uwbbench.run.experiment import read_experiment
-    from uwbbench.tune import read_tuning
+    from uwbbench.tools.gate import read_gate
+    from uwbbench.tools.tune import read_tuning
 
     keys = read_yaml(path).data
     if "tuning" in keys:

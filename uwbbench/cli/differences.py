@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from uwbbench import registry
+from uwbbench.api import registry
 from uwbbench.cli import render
-from uwbbench.report.sheet import interval, number, shown
-from uwbbench.report.wording import TITLES, scale
+from uwbbench.show.text.sheet import interval, number, shown
+from uwbbench.show.text.wording import TITLES, scale
 
 if TYPE_CHECKING:
-    from uwbbench.comparison import Comparison
+    from uwbbench.results.comparison import Comparison
 
 LONGEST_VALUE = 100
 
@@ -52,7 +52,7 @@ def _scores(found: Comparison) -> None:
     rows = []
     for one in found.changed_scores:
         dataset, source, scoring, table = one.board
-        unit, digits, factor = scale(registry.load("metrics", one.metric).unit)
+        unit, digits, factor = scale(registry.load_plugin("metrics", one.metric).unit)
         d = one.difference
         rows.append(
             (
@@ -116,9 +116,9 @@ def _worst(found: Comparison, most: int) -> Iterator[tuple[str, ...]]:
 
 def draw_worst(found: Comparison, target: Path, data_dir: Path | None) -> None:
     """Draw the worst flipped frame into a file."""
-    from uwbbench.comparison.figure import draw_flip
     from uwbbench.config.source import data_roots
-    from uwbbench.plot import style
+    from uwbbench.show.figures import style
+    from uwbbench.show.figures.flip import draw_flip
 
     if not found.worst:
         typer.echo("note: no frame flipped, so there is no picture", err=True)

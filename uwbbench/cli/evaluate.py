@@ -14,7 +14,7 @@ from uwbbench.cli import options, render
 
 if TYPE_CHECKING:
     from uwbbench.api.capture import Capture
-    from uwbbench.pipeline import Pipeline
+    from uwbbench.detect.pipeline import Pipeline
 
 
 def score(
@@ -29,8 +29,8 @@ def score(
 ) -> None:
     """Score a detector on a capture with ground truth, and time it."""
     import uwbbench
-    from uwbbench.scoring import ScoringRules
-    from uwbbench.store.identity import plain
+    from uwbbench.measure.accuracy.scoring import ScoringRules
+    from uwbbench.run.folder.identity import plain
 
     ScoringRules(scoring.value, gate_m)  # a wrong gate is found before the detector has run
     opened, pipeline = _open(capture, receiver, detector, settings)
@@ -63,8 +63,8 @@ def score(
 def _latency_us(path: Path, opened: Capture, pipeline: Pipeline) -> dict[str, Any]:
     """Times in microseconds, measured in a fresh process, and the number of calls behind them."""
     from uwbbench.config.source import CaptureRef
-    from uwbbench.timing import measure
-    from uwbbench.timing.settings import LatencyModel
+    from uwbbench.measure.latency import measure
+    from uwbbench.measure.latency.settings import LatencyModel
 
     receiver = opened.radar.receiver if len(opened.receivers) > 1 else None
     measured = measure(
@@ -76,7 +76,7 @@ def _latency_us(path: Path, opened: Capture, pipeline: Pipeline) -> dict[str, An
 
 def _open(path: Path, receiver: str | None, detector: str, settings: list[str] | None) -> tuple[Capture, Pipeline]:
     import uwbbench
-    from uwbbench.config.override import parse_settings
+    from uwbbench.api.override import parse_settings
 
     pipeline = uwbbench.load_detector(detector, changes=parse_settings(settings or ()))
     return uwbbench.open_capture(path, receiver), pipeline
@@ -90,7 +90,7 @@ def detect(
     settings: options.Settings = None,
 ) -> None:
     """Write what a detector finds on a capture. No ground truth is needed."""
-    from uwbbench.store.files import replacing
+    from uwbbench.run.folder.files import replacing
 
     suffix = options.format_of(output, ".csv", ".parquet")
     opened, pipeline = _open(capture, receiver, detector, settings)
@@ -121,8 +121,8 @@ def calibrate(
     import yaml
 
     import uwbbench
-    from uwbbench.config.override import parse_settings
-    from uwbbench.store.files import write_text
+    from uwbbench.api.override import parse_settings
+    from uwbbench.run.folder.files import write_text
 
     options.format_of(output, ".yaml", ".yml")
     opened, pipeline = _open(capture, receiver, detector, settings)

@@ -12,7 +12,7 @@ from uwbbench.api.errors import StoreError
 from uwbbench.cli import options, render
 
 if TYPE_CHECKING:
-    from uwbbench.gate import Result
+    from uwbbench.tools.gate import Result
 
 STEP_SUMMARY = "GITHUB_STEP_SUMMARY"
 
@@ -36,9 +36,9 @@ def gate(
     Speed against a base, missed deadlines, and accuracy. Exit codes: 0 pass; 1 regression; 2 inconclusive, or the file
     is wrong; 3 invalid: nothing could be measured, or the base differs from itself.
     """
-    from uwbbench.config.override import parse_settings
-    from uwbbench.gate import publish, read_gate, run_gate
-    from uwbbench.store.files import write_text
+    from uwbbench.api.override import parse_settings
+    from uwbbench.run.folder.files import write_text
+    from uwbbench.tools.gate import publish, read_gate, run_gate
 
     checked = read_gate(file, parse_settings(settings or ()), data_dir)
     summary = summary or (Path(os.environ[STEP_SUMMARY]) if os.environ.get(STEP_SUMMARY) else None)
@@ -60,14 +60,14 @@ def gate(
 
 def _append(path: Path, text: str) -> None:
     """Add to a file that other steps write to as well."""
-    from uwbbench.store.files import disk_errors
+    from uwbbench.run.folder.files import disk_errors
 
     with disk_errors(path, "written"), path.open("a", encoding="utf-8", errors="backslashreplace") as file:
         file.write(text)
 
 
 def _print(result: Result) -> None:
-    from uwbbench.gate.publish import COLUMNS, one_line, rows
+    from uwbbench.tools.gate.publish import COLUMNS, one_line, rows
 
     render.print_table(f"gate {one_line(result.gate)}", COLUMNS, rows(result))
     render.print_facts({"head": one_line(result.head), "base": one_line(result.base)})

@@ -40,7 +40,7 @@ def list_names(
     json: options.Json = False,
 ) -> None:
     """List what is installed. Nothing of it is loaded."""
-    from uwbbench import registry
+    from uwbbench.api import registry
 
     found = {name: _listed(name) for name in ([kind.value] if kind else registry.KINDS)}
     if json:
@@ -53,8 +53,8 @@ def list_names(
 
 
 def _listed(kind: Any) -> list[dict[str, str]]:
-    from uwbbench import registry
-    from uwbbench.config.locate import shipped
+    from uwbbench.api import registry
+    from uwbbench.api.locate import shipped
 
     files = shipped("detectors") if kind == "detectors" else {}
     own = {"package": f"uwbbench {uwbbench.__version__}", "problem": ""}
@@ -151,7 +151,7 @@ def schema(
     ] = None,
 ) -> None:
     """Print a JSON Schema of such a file, for editors."""
-    from uwbbench.schema import detector_schema, experiment_schema, gate_schema, scene_schema, tuning_schema
+    from uwbbench.tools.schema import detector_schema, experiment_schema, gate_schema, scene_schema, tuning_schema
 
     makers = {
         File.DETECTOR: detector_schema,
@@ -165,7 +165,7 @@ def schema(
         render.print_json(made)
         return
     options.format_of(output, ".json")
-    from uwbbench.store.files import write_json
+    from uwbbench.run.folder.files import write_json
 
     write_json(output, made)
     typer.echo(f"{file.value} schema written to {output}")

@@ -35,8 +35,9 @@ def leaderboard(
     compared where experiment, content of captures and scoring rules agree; times only as ratios to the common
     reference detector.
     """
-    from uwbbench.leaderboard import Content, Unverified, check_site, read_runs, rendered, suites, write_site
-    from uwbbench.store.identity import plain
+    from uwbbench.results.leaderboard import Unverified, read_runs, suites
+    from uwbbench.run.folder.identity import plain
+    from uwbbench.show.site import Content, check_site, rendered, write_site
 
     if output is not None:
         check_site(output)
@@ -82,8 +83,8 @@ def verify(runs: RunPaths, json: options.Json = False) -> None:
     scores from the stored detections. Exits with 1 and a list if something does not hold, with 2 where a folder is no
     run folder.
     """
-    from uwbbench.store import RunFolder
-    from uwbbench.store.verify import verify as check
+    from uwbbench.run.folder import RunFolder
+    from uwbbench.run.folder.verify import verify as check
 
     folders = [RunFolder(path) for path in runs]
     found = {}
@@ -130,9 +131,9 @@ def diff(
     machine never repeat: they are no difference for --exit-code.
     """
     from uwbbench.cli import differences
-    from uwbbench.comparison import compare
-    from uwbbench.store import RunFolder
-    from uwbbench.store.identity import plain
+    from uwbbench.results.comparison import compare
+    from uwbbench.run.folder import RunFolder
+    from uwbbench.run.folder.identity import plain
 
     if figure is not None:
         options.format_of(figure, ".png", ".svg", ".pdf")

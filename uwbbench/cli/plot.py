@@ -13,7 +13,7 @@ from uwbbench.cli import options
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from uwbbench.plot.draw import Choices
+    from uwbbench.show.figures.draw import Choices
 
 KINDS_HELP = "Kind: cir, radargram, properties, pipeline, cdf or map."
 
@@ -49,9 +49,9 @@ def plot(
     peaks through the filters to clusters, from above. cdf: distribution of the absolute errors. map: clustered points,
     true outlines and robot path.
     """
-    from uwbbench.plot import style
-    from uwbbench.plot.draw import Choices, check_kind, draw_run
-    from uwbbench.store import RunFolder
+    from uwbbench.run.folder import RunFolder
+    from uwbbench.show.figures import style
+    from uwbbench.show.figures.draw import Choices, check_kind, draw_run
 
     choices = Choices(frame, None if scoring is None else scoring.value, gate_m, table)
     check_kind(kind, choices)
@@ -85,8 +85,8 @@ def _of_capture(
     settings: list[str] | None,
 ) -> Figure:
     import uwbbench
-    from uwbbench.config.override import parse_settings
-    from uwbbench.plot.draw import draw_capture
+    from uwbbench.api.override import parse_settings
+    from uwbbench.show.figures.draw import draw_capture
 
     changes = parse_settings(settings or ())
     if changes and detector is None:

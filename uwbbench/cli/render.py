@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 if TYPE_CHECKING:
-    from uwbbench.report import Report
+    from uwbbench.results import Report
 
 NOT_A_TERMINAL_WIDTH = 1000
 """Columns of a table that goes into a file or a pipe: nothing is cut off there."""
@@ -115,7 +115,7 @@ def _score(block: Mapping[str, Any], key: str, unit: str | None) -> str:
 
 
 def _why_undefined(block: Mapping[str, Any], key: str) -> str:
-    """Why a score is undefined, by the conventions of :mod:`uwbbench.metrics`."""
+    """Why a score is undefined, by the conventions of :mod:`uwbbench.measure.accuracy.metrics`."""
     if not block["exhaustive"] and key in ("precision", "f1", "false_alarms_per_minute"):
         return "truth not exhaustive"
     if key == "chance_recall":
@@ -129,7 +129,7 @@ def _why_undefined(block: Mapping[str, Any], key: str) -> str:
 
 def print_report(report: Report) -> None:
     """Print all tables of a run, each with what a reader must know."""
-    from uwbbench.report.render import sheets
+    from uwbbench.show.text.report import sheets
 
     for sheet in sheets(report):
         print_table(sheet.title, sheet.columns, sheet.rows)

@@ -15,9 +15,9 @@ from uwbbench.api.errors import ConfigError
 from uwbbench.cli import options, render
 
 if TYPE_CHECKING:
-    from uwbbench.report import Report
+    from uwbbench.results import Report
     from uwbbench.run import Progress
-    from uwbbench.store import RunFolder
+    from uwbbench.run.folder import RunFolder
 
 UNITS_FAILED, INTERRUPTED = 3, 130
 
@@ -46,7 +46,7 @@ def run(
     Prints a leaderboard and leaves a run folder. A detector or capture that fails is a row with its reason; the exit
     code is then 3.
     """
-    from uwbbench.config.override import parse_settings
+    from uwbbench.api.override import parse_settings
     from uwbbench.run import Interrupted, run_experiment
     from uwbbench.run.experiment import read_experiment
 
@@ -132,8 +132,8 @@ def report(
 
     The page is one file that opens offline. Captures that are at hand are opened again to draw their samples.
     """
-    from uwbbench.report import Report, read_safely
-    from uwbbench.store import RunFolder
+    from uwbbench.results import Report, read_safely
+    from uwbbench.run.folder import RunFolder
 
     chosen = _format_of(output, form, json=json)
     with read_safely(run):
@@ -164,8 +164,8 @@ def _format_of(output: Path | None, form: Format | None, *, json: bool) -> Forma
 
 
 def _write_report(made: Report, form: Format, output: Path | None, data_dir: Path | None, *, force: bool) -> None:
-    from uwbbench.report import formats, markdown
-    from uwbbench.store.files import write_json, write_text
+    from uwbbench.run.folder.files import write_json, write_text
+    from uwbbench.show.text import formats, markdown
 
     if output is not None:
         formats.check_replaceable(output, force=force)
@@ -183,15 +183,15 @@ def _write_report(made: Report, form: Format, output: Path | None, data_dir: Pat
 
 def _page(made: Report, data_dir: Path | None) -> str:
     from uwbbench.config.source import data_roots
-    from uwbbench.report.page import Content, page
+    from uwbbench.show.page import Content, page
 
     return page(Content(made, data_roots(data_dir)))
 
 
 def _write_figures(made: Report, folder: Path, data_dir: Path | None, *, force: bool) -> None:
     from uwbbench.config.source import data_roots
-    from uwbbench.report import formats
-    from uwbbench.report.page import Content, write_figures
+    from uwbbench.show.page import Content, write_figures
+    from uwbbench.show.text import formats
 
     formats.check_replaceable(folder, force=force)
     written = write_figures(Content(made, data_roots(data_dir)), folder)
@@ -214,7 +214,7 @@ def rescore(
     from dataclasses import replace
 
     from uwbbench.run import rescore as score_again
-    from uwbbench.store import RunFolder
+    from uwbbench.run.folder import RunFolder
 
     folder = RunFolder(run)
     before = folder.rules
@@ -226,8 +226,9 @@ def rescore(
 
 def _conclude(folder: RunFolder, data_dir: Path | None, *, json: bool) -> None:
     """Write the report into the run folder, as Markdown and as a page, and show its leaderboard."""
-    from uwbbench.report import Report, formats, read_safely, write_report
-    from uwbbench.report.page import ReportToolsError
+    from uwbbench.results import Report, read_safely
+    from uwbbench.show.page import ReportToolsError
+    from uwbbench.show.text import formats, write_report
 
     with read_safely(folder.path):
         made = Report(folder)

@@ -15,7 +15,7 @@ from uwbbench.cli import options, render
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from uwbbench.checks import Conformance, Kind
+    from uwbbench.tools.check import Conformance, Kind
 
 CHECK_FAILED = 1
 
@@ -40,7 +40,7 @@ def new(
 
     It can be installed, and holds working code to start from. Nothing that exists is overwritten.
     """
-    from uwbbench.scaffold import write_package
+    from uwbbench.tools.scaffold import write_package
 
     target = write_package(kind.value, name, output)
     typer.echo(f"{kind.value} '{name}' written to {target}; next:\n")
@@ -73,9 +73,9 @@ def check(
 
     Each failure is explained: what was expected, what was found, and where to read more. Exits with 1 if a check fails.
     """
-    from uwbbench.checks import KINDS, examine, kinds_of, subject_of
-    from uwbbench.config.override import parse_settings
+    from uwbbench.api.override import parse_settings
     from uwbbench.config.source import data_roots
+    from uwbbench.tools.check import KINDS, examine, kinds_of, subject_of
 
     kinds = (kind.value,) if kind else KINDS if name is None else kinds_of(name)
     if show_checks:
@@ -96,7 +96,7 @@ def check(
 
 
 def _list(kinds: Iterable[Kind], *, json: bool) -> None:
-    from uwbbench.checks import all_checks
+    from uwbbench.tools.check import all_checks
 
     listed = {kind: [(one.name, one.statement, one.read_more) for one in all_checks(kind)] for kind in kinds}
     columns = ("check", "what and why", "read more")

@@ -22,8 +22,8 @@ def simulate(
 ) -> None:
     """Simulate a scene into a capture file."""
     from uwbbench.api.capture_file import write_capture
-    from uwbbench.config.locate import find_config
-    from uwbbench.config.override import parse_settings
+    from uwbbench.api.locate import find_config
+    from uwbbench.api.override import parse_settings
     from uwbbench.config.source import open_dataset
 
     options.format_of(output, ".h5")

@@ -9,7 +9,7 @@ import typer
 from uwbbench.cli import options, render
 
 if TYPE_CHECKING:
-    from uwbbench.stability import Stability
+    from uwbbench.measure.robustness import Stability
 
 CHECK_FAILED = 1
 
@@ -27,8 +27,8 @@ def stability(
     Inputs at which numerical code breaks, each with the behaviour that is expected. Exits with 1 if a case fails.
     """
     import uwbbench
-    from uwbbench.config.override import parse_settings
-    from uwbbench.stability import case_named, examine
+    from uwbbench.api.override import parse_settings
+    from uwbbench.measure.robustness import case_named, examine
 
     chosen = [case_named(name) for name in case] if case else None
     found = examine(uwbbench.load_detector(detector, changes=parse_settings(settings or ())), chosen)

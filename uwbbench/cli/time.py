@@ -15,7 +15,7 @@ from uwbbench.cli import options, render
 if TYPE_CHECKING:
     from uwbbench.api.capture import Capture
     from uwbbench.config.source import CaptureRef
-    from uwbbench.timing import Latency
+    from uwbbench.measure.latency import Latency
 
 _OF_A_DATASET = re.compile(r"(?P<dataset>[\w.-]+)\[(?P<name>.+)\]")
 
@@ -55,8 +55,8 @@ def time(
     machine only.
     """
     import uwbbench
-    from uwbbench.timing import measure
-    from uwbbench.timing.settings import LatencyModel
+    from uwbbench.measure.latency import measure
+    from uwbbench.measure.latency.settings import LatencyModel
 
     if rate_hz is not None and paced is None:
         raise ConfigError("--rate-hz is the rate of --paced, which is not given")

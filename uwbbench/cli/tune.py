@@ -13,7 +13,7 @@ import typer
 from uwbbench.cli import options, render
 
 if TYPE_CHECKING:
-    from uwbbench.tune import TuneOutcome
+    from uwbbench.tools.tune import TuneOutcome
 
 
 def tune(
@@ -45,9 +45,9 @@ def tune(
     that is worth. Leaves a folder with a detector for each, the scores of all sets, and how far the thresholds may be
     off (the stable zone).
     """
-    from uwbbench.config.override import parse_settings
-    from uwbbench.tune import new_folder, publish, read_tuning, to_dict
-    from uwbbench.tune import tune as run_tuning
+    from uwbbench.api.override import parse_settings
+    from uwbbench.tools.tune import new_folder, publish, read_tuning, to_dict
+    from uwbbench.tools.tune import tune as run_tuning
 
     if figure is not None:
         options.format_of(figure, ".png", ".svg", ".pdf")
@@ -72,15 +72,15 @@ def _require_grid(is_grid: bool) -> None:
 
     if not is_grid:
         raise ConfigError("--figure draws the stable zone of a grid; a search has none")
-    from uwbbench.plot.style import styled
+    from uwbbench.show.figures.style import styled
 
     with styled():  # refuses now, not after the work, where matplotlib is missing
         pass
 
 
 def _draw(outcome: TuneOutcome, figure: Path) -> None:
-    from uwbbench.plot import style
-    from uwbbench.plot.stable_zone import draw_stable_zone
+    from uwbbench.show.figures import style
+    from uwbbench.tools.tune.figure import draw_stable_zone
 
     style.save(draw_stable_zone(outcome), figure)
     typer.echo(f"stable zone drawn in {figure}", err=True)
@@ -100,7 +100,7 @@ def _progress(quiet: bool) -> Iterator[Callable[[str], None]]:
 
 
 def _print(outcome: TuneOutcome) -> None:
-    from uwbbench.tune import sheets
+    from uwbbench.tools.tune import sheets
 
     for sheet in sheets(outcome):
         render.print_table(sheet.title, sheet.columns, sheet.rows)

@@ -10,7 +10,7 @@ import typer
 from uwbbench.cli import options, render
 
 if TYPE_CHECKING:
-    from uwbbench.warmup import Warmed
+    from uwbbench.tools.warmup import Warmed
 
 UNITS_FAILED = 3
 
@@ -35,8 +35,8 @@ def warmup(
     UWBBENCH_CACHE_DIR names; it fits the processor that it was made on. These files are executed: name no folder that
     others can write to. Exits with 3 if a detector fails.
     """
-    from uwbbench.pipeline import load_detector
-    from uwbbench.warmup import installed_detectors, warm_up
+    from uwbbench.detect.pipeline import load_detector
+    from uwbbench.tools.warmup import installed_detectors, warm_up
 
     for name in detector or ():
         load_detector(name)  # a mistake ends the command before anything runs

@@ -9,12 +9,12 @@ from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from uwbbench import registry
+from uwbbench.api import registry
 from uwbbench.api.check import checked
 from uwbbench.api.errors import ConfigError, PluginError
+from uwbbench.api.locate import find_config
+from uwbbench.api.override import merged, with_values
 from uwbbench.api.yaml_file import YamlFile, parse_yaml, read_yaml
-from uwbbench.config.locate import find_config
-from uwbbench.config.override import merged, with_values
 
 IMPLIED = {
     "profile": "profile.minmax",
@@ -200,15 +200,15 @@ def _completed(steps: list[Step]) -> list[Step]:
     """Steps with the implied ones put in directly before their first user."""
     made = {"frames"}
     for step in steps:
-        made |= registry.load("stages", step.use).produces
+        made |= registry.load_plugin("stages", step.use).produces
     taken = {step.label for step in steps}
     whole: list[Step] = []
 
     def put(step: Step) -> None:
-        for port in sorted(registry.load("stages", step.use).consumes - made):
+        for port in sorted(registry.load_plugin("stages", step.use).consumes - made):
             use = IMPLIED.get(port)
             if use in registry.entries("stages") and use not in taken:
-                made.update(registry.load("stages", use).produces)
+                made.update(registry.load_plugin("stages", use).produces)
                 taken.add(use)
                 put(Step(use, use, place=step.place, implied_by=step.label))
         whole.append(step)
@@ -237,7 +237,7 @@ def _check_params(step: Step, source: YamlFile, index: int) -> None:
     """Check a step's parameters for each channel that they distinguish."""
     at = ("pipeline", index)
     try:
-        stage = registry.load("stages", step.use)
+        stage = registry.load_plugin("stages", step.use)
     except PluginError as error:
         raise PluginError(f"{source.place((*at, 'use'))}: {error}") from error
     tables = [value[BY_CHANNEL] for value in step.params.values() if isinstance(value, dict) and BY_CHANNEL in value]

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from uwbbench import registry
+from uwbbench.api import registry
 from uwbbench.api.capture import Capture
 from uwbbench.api.check import checked
 from uwbbench.api.dataset import Dataset
@@ -54,7 +54,7 @@ def open_dataset(
     PluginError, ConfigError
         If the adapter is unknown or a parameter wrong; messages name ``source`` and the place in it.
     """
-    adapter = registry.load("datasets", use)
+    adapter = registry.load_plugin("datasets", use)
     place = source or YamlFile(f"dataset '{use}'", dict(params), {})
     dataset: Dataset[Any] = adapter(checked(adapter.params_type(), dict(params), place, at), roots)
     return dataset

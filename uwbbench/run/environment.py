@@ -8,8 +8,9 @@ from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
-from uwbbench import __version__, registry
-from uwbbench.timing.machine import machine
+from uwbbench import __version__
+from uwbbench.api import registry
+from uwbbench.measure.latency.machine import machine
 
 _PACKAGES = ("numpy", "scipy", "scikit-learn", "joblib", "pyarrow", "pandas", "h5py", "pydantic")
 

@@ -22,20 +22,20 @@ from joblib import Parallel, delayed
 
 from uwbbench.api.errors import StoreError, UwbbenchError
 from uwbbench.config.detector import DetectorConfig, read_detector
-from uwbbench.pipeline import Pipeline
+from uwbbench.detect.pipeline import Pipeline
+from uwbbench.measure.latency.machine import machine, usable_cores
 from uwbbench.run import environment
 from uwbbench.run.experiment import Experiment
+from uwbbench.run.folder.folder import RunFolder
+from uwbbench.run.folder.identity import canonical, plain
+from uwbbench.run.folder.journal import Entry
+from uwbbench.run.folder.scored import table_of
 from uwbbench.run.hard_cases import examined
 from uwbbench.run.hard_cases import failed as unexamined
 from uwbbench.run.hard_cases import identity_of as stability_identity
 from uwbbench.run.hard_cases import unit_of as stability_unit
 from uwbbench.run.plan import Plan, Unit, plan, reason_of, rules_of
 from uwbbench.run.unit import Finished, Job, content_of, entry_of, identity_of, run_unit
-from uwbbench.store.folder import RunFolder
-from uwbbench.store.identity import canonical, plain
-from uwbbench.store.journal import Entry
-from uwbbench.store.scored import table_of
-from uwbbench.timing.machine import machine, usable_cores
 
 
 class Interrupted(UwbbenchError):
@@ -313,7 +313,7 @@ class _Run:
             self.progress(Progress(self.done, self.total, entry))
 
     def _time(self, unit: Unit, sha256: str) -> None:
-        from uwbbench.timing import measure
+        from uwbbench.measure.latency import measure
 
         started = time.perf_counter()
         try:

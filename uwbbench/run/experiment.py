@@ -12,15 +12,15 @@ from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator
 
-from uwbbench import registry
+from uwbbench.api import registry
 from uwbbench.api.check import checked
 from uwbbench.api.errors import CaptureError, ConfigError, PluginError, UwbbenchError, nearest
+from uwbbench.api.locate import find_config
+from uwbbench.api.override import merged, with_values
 from uwbbench.api.yaml_file import Path_, YamlFile, read_yaml
 from uwbbench.config.detector import DetectorConfig, read_detector
-from uwbbench.config.locate import find_config
-from uwbbench.config.override import merged, with_values
 from uwbbench.config.source import CaptureRef, data_roots, open_dataset
-from uwbbench.timing.settings import LatencyModel
+from uwbbench.measure.latency.settings import LatencyModel
 
 Scoring = Literal["frame", "peak", "object"]
 
@@ -247,7 +247,7 @@ def read_experiment(
         raise ConfigError(f"{source.place(('set',))}: 'set' changes an extended experiment, but 'extends' is missing")
     for index, metric in enumerate(model.metrics):
         with standing(source, ("metrics", index)):
-            registry.load("metrics", metric)
+            registry.load_plugin("metrics", metric)
     if model.latency.enabled and model.latency.reference is not None:
         with standing(source, ("latency", "reference")):
             read_detector(model.latency.reference, path.parent)
@@ -313,7 +313,7 @@ def _anchored(item: Any, folder: Path) -> Any:
 
 
 def _detectors(model: ExperimentModel, source: YamlFile, folder: Path) -> tuple[DetectorConfig, ...]:
-    from uwbbench.pipeline import Pipeline
+    from uwbbench.detect.pipeline import Pipeline
 
     found: dict[str, DetectorConfig] = {}
     for index, item in enumerate(model.detectors):
@@ -356,7 +356,7 @@ def dataset_sources(
     for index, item in enumerate(uses):
         at = (key, index)
         with standing(source, (*at, "use")):
-            registry.load("datasets", item.use)
+            registry.load_plugin("datasets", item.use)
         open_dataset(item.use, item.params, [Path(root) for root in roots], source, (*at, "params"))
         same = sum(other.use == item.use for other in found)
         label = item.name or (f"{item.use} {same + 1}" if same else item.use)

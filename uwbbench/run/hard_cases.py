@@ -8,11 +8,11 @@ import traceback
 from uwbbench import __version__
 from uwbbench.api.errors import UwbbenchError
 from uwbbench.config.detector import DetectorConfig
-from uwbbench.pipeline import Pipeline
+from uwbbench.detect.pipeline import Pipeline
+from uwbbench.run.folder.identity import digest, file_id
+from uwbbench.run.folder.journal import Entry
 from uwbbench.run.plan import reason_of
 from uwbbench.run.unit import die_with
-from uwbbench.store.identity import digest, file_id
-from uwbbench.store.journal import Entry
 
 
 def unit_of(detector: DetectorConfig) -> str:
@@ -32,7 +32,7 @@ def examined(detector: DetectorConfig, parent: int) -> Entry:
     """
     from threadpoolctl import threadpool_limits
 
-    from uwbbench.stability import examine
+    from uwbbench.measure.robustness import examine
 
     die_with(parent)
     try:

@@ -7,10 +7,10 @@ from typing import Literal
 
 from uwbbench.config.detector import DetectorConfig
 from uwbbench.config.source import CaptureRef
+from uwbbench.measure.accuracy.scoring import Region, ScoringRules
 from uwbbench.run.experiment import Experiment
-from uwbbench.scoring import Region, ScoringRules
-from uwbbench.store.identity import file_id
-from uwbbench.store.journal import Entry
+from uwbbench.run.folder.identity import file_id
+from uwbbench.run.folder.journal import Entry
 
 
 @dataclass(frozen=True)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from uwbbench.scoring import ScoringRules
-from uwbbench.store.folder import RunFolder
-from uwbbench.store.scored import score_rows, table_of
+from uwbbench.measure.accuracy.scoring import ScoringRules
+from uwbbench.run.folder.folder import RunFolder
+from uwbbench.run.folder.scored import score_rows, table_of
 
 
 def rescore(folder: RunFolder, rules: Sequence[ScoringRules] | None = None) -> None:

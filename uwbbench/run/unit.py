@@ -15,12 +15,12 @@ from typing import Any
 from uwbbench.api.capture import Capture, CaptureHeader
 from uwbbench.api.detections import Detections
 from uwbbench.config.source import CaptureRef
-from uwbbench.pipeline import Pipeline
+from uwbbench.detect.pipeline import Pipeline
+from uwbbench.measure.accuracy.scoring import ScoringRules
+from uwbbench.run.folder.identity import digest
+from uwbbench.run.folder.journal import Entry, Status
+from uwbbench.run.folder.scored import score_rows
 from uwbbench.run.plan import Unit, reason_of
-from uwbbench.scoring import ScoringRules
-from uwbbench.store.identity import digest
-from uwbbench.store.journal import Entry, Status
-from uwbbench.store.scored import score_rows
 
 
 @dataclass(frozen=True)

@@ -8,8 +8,7 @@ from typing import Any, ClassVar
 
 from pydantic import Field
 
-from uwbbench.api import Capture, CaptureError, Card, ConfigError, Dataset, Params, nearest
-from uwbbench.config.locate import find_config
+from uwbbench.api import Capture, CaptureError, Card, ConfigError, Dataset, Params, find_config, nearest
 from uwbbench_datasets.simulator.engine import Simulation, simulate
 from uwbbench_datasets.simulator.scene import Scene, SceneModel, TermUse, read_scenes
 

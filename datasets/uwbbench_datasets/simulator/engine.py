@@ -24,8 +24,8 @@ from uwbbench.api import (
     Trajectory,
     Truth,
     View,
+    receiver_pose,
 )
-from uwbbench.api.geometry import receiver_pose
 from uwbbench_datasets.simulator.fidelity import Contribution, choose, described
 from uwbbench_datasets.simulator.scene import Scene
 from uwbbench_datasets.simulator.trajectory import sampled

@@ -11,10 +11,20 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import Field, model_validator
 
-from uwbbench.api import ConfigError, Params, PluginError, Pulse, Radar, Term, YamlFile, checked, read_yaml
-from uwbbench.api.radar import CHANNEL_CENTER_HZ
-from uwbbench.config.override import with_values
-from uwbbench.registry import load
+from uwbbench.api import (
+    CHANNEL_CENTER_HZ,
+    ConfigError,
+    Params,
+    PluginError,
+    Pulse,
+    Radar,
+    Term,
+    YamlFile,
+    checked,
+    load_plugin,
+    read_yaml,
+    with_values,
+)
 from uwbbench_datasets.simulator.pulses import GaussianPulse, RaisedCosinePulse
 from uwbbench_datasets.simulator.shapes import ObjectModel
 from uwbbench_datasets.simulator.trajectory import Point, TrajectoryModel, in_space
@@ -236,7 +246,7 @@ def _terms(model: SceneModel, source: YamlFile) -> tuple[tuple[TermUse, type[Ter
     found = []
     for index, item in enumerate(model.terms):
         try:
-            term: type[Term[Any]] = load("terms", item.use)
+            term: type[Term[Any]] = load_plugin("terms", item.use)
         except PluginError as error:
             raise PluginError(f"{source.place(('terms', index, 'use'))}: {error}") from error
         params = checked(term.params_type(), item.params, source, ("terms", index, "params"))

@@ -8,8 +8,7 @@ from typing import Literal
 import numpy as np
 from pydantic import Field, model_validator
 
-from uwbbench.api import FloatArray, Obstacle, Params, SceneObject
-from uwbbench.api.geometry import rotate_z
+from uwbbench.api import FloatArray, Obstacle, Params, SceneObject, rotate_z
 from uwbbench_datasets.simulator.trajectory import Point, in_space
 
 _SIZES = {

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from uwbbench.api.compiled import compiled
+from uwbbench.api import compiled
 
 NONE = -1
 BORDER = -2

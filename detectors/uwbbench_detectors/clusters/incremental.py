@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from uwbbench.api import BoolArray, FloatArray, IntArray
-from uwbbench.api.compiled import compiled
+from uwbbench.api import BoolArray, FloatArray, IntArray, compiled
 from uwbbench_detectors.clusters.grid import (
     AROUND,
     BORDER,

@@ -6,8 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from uwbbench.api import FloatArray, IntArray
-from uwbbench.api.compiled import compiled
+from uwbbench.api import FloatArray, IntArray, compiled
 from uwbbench_detectors.clusters.grid import NONE, UNNUMBERED, Grid, Radius, root_of
 from uwbbench_detectors.clusters.incremental import IncrementalDbscan, dbscan, insert, root_of_border
 

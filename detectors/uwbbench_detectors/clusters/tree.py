@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from uwbbench.api.compiled import compiled
+from uwbbench.api import compiled
 from uwbbench_detectors.clusters.grid import NONE, Grid, Radius, bounds_reach, neighbours
 
 SCANNED = 32

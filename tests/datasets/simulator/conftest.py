@@ -8,7 +8,7 @@ import yaml
 
 from uwbbench.api import Capture, Radar, Term, View
 from uwbbench.api.geometry import receiver_pose
-from uwbbench.registry import load
+from uwbbench.api.registry import load_plugin
 from uwbbench_datasets.simulator.engine import simulate
 from uwbbench_datasets.simulator.pulses import GaussianPulse
 from uwbbench_datasets.simulator.scene import read_scenes
@@ -64,7 +64,7 @@ def make_term():
     """Build a registered term with parameters."""
 
     def build(name: str, **params: Any) -> Term[Any]:
-        kind = load("terms", name)
+        kind = load_plugin("terms", name)
         return kind(kind.params_type().model_validate(params))
 
     return build

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from uwbbench.api import CaptureError, Paths, Term, View
-from uwbbench.registry import load
+from uwbbench.api.registry import load_plugin
 from uwbbench_datasets.simulator.engine import add_paths, simulate
 from uwbbench_datasets.simulator.pulses import GaussianPulse, RaisedCosinePulse
 from uwbbench_datasets.simulator.scene import Scene, read_scenes
@@ -36,7 +36,7 @@ def scene(tmp_path: Path):
 
 def a_view(taps: int, crest_tap: np.ndarray, pulse) -> View:
     """A view of which only what synthesis needs matters."""
-    adapter = load("datasets", "approach")
+    adapter = load_plugin("datasets", "approach")
     radar = adapter(adapter.params_type()(), ()).open("approach-ch9-metal-1").radar
     frames = len(crest_tap)
     zeros = np.zeros((frames, 3))
@@ -185,4 +185,4 @@ def test_hooks_that_a_term_does_not_have_cost_nothing(scene) -> None:
     costs = {one.name: one for one in simulate(scene()).contributions["front"]}
     assert costs["direct"].pulses == len(simulate(scene()).captures[0])
     assert costs["noise"].pulses == 0
-    assert Term.paths is load("terms", "noise").paths
+    assert Term.paths is load_plugin("terms", "noise").paths

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from uwbbench.pipeline import load_detector
+from uwbbench.detect.pipeline import load_detector
 from uwbbench_datasets.simulator.engine import BLOCK, simulate
 from uwbbench_datasets.simulator.scene import Scene, read_scenes
 

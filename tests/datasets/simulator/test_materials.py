@@ -6,12 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from uwbbench.api import ConfigError
-from uwbbench_datasets.simulator.materials import (
-    MATERIALS,
-    SHAPE_LOSS_DB,
-    permittivity,
-    reflection,
-)
+from uwbbench_datasets.simulator.materials import MATERIALS, SHAPE_LOSS_DB, permittivity, reflection
 
 CHANNEL_5_HZ, CHANNEL_9_HZ = 6489.6e6, 7987.2e6
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from uwbbench.api import CaptureError, ConfigError, PluginError
-from uwbbench.config.locate import shipped
-from uwbbench.registry import load
+from uwbbench.api.locate import shipped
+from uwbbench.api.registry import load_plugin
 from uwbbench_datasets.simulator.dataset import Simulated, SimulatedParams
 from uwbbench_datasets.simulator.scene import read_scenes
 
@@ -135,4 +135,4 @@ def test_two_scenes_of_one_name_are_refused(write, tmp_path: Path) -> None:
 
 
 def test_the_dataset_is_registered() -> None:
-    assert load("datasets", "simulated") is Simulated
+    assert load_plugin("datasets", "simulated") is Simulated

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from uwbbench.api import Capture, magnitude
-from uwbbench.pipeline import detector_from_yaml
+from uwbbench.detect.pipeline import detector_from_yaml
 from uwbbench_datasets.simulator.engine import simulate
 from uwbbench_datasets.simulator.pulses import GaussianPulse, RaisedCosinePulse
 from uwbbench_datasets.simulator.scene import read_scenes

@@ -7,8 +7,7 @@ import dataclasses
 import numpy as np
 from pydantic import Field
 
-from uwbbench.api import Capture, Params, Term
-from uwbbench.api.geometry import rotate_z, wrap_angle
+from uwbbench.api import Capture, Params, Term, rotate_z, wrap_angle
 
 
 class OdometryParams(Params):

@@ -18,8 +18,7 @@ import numpy as np
 from pydantic import Field
 from scipy.special import fresnel
 
-from uwbbench.api import FloatArray, Params, Paths, SceneObject, Term, View
-from uwbbench.api.stage import P
+from uwbbench.api import FloatArray, P, Params, Paths, SceneObject, Term, View
 from uwbbench_datasets.simulator.materials import SHAPE_LOSS_DB, reflection
 from uwbbench_datasets.simulator.shapes import Face, faces
 

@@ -8,17 +8,21 @@ from dataclasses import dataclass
 import numpy as np
 from pydantic import Field
 
-from uwbbench.api import SPEED_OF_LIGHT_M_S, BoolArray, ComplexArray, FloatArray, Params, Paths, SceneObject, Term, View
-from uwbbench.api.geometry import nearest_on_outline
+from uwbbench.api import (
+    SPEED_OF_LIGHT_M_S,
+    BoolArray,
+    ComplexArray,
+    FloatArray,
+    Params,
+    Paths,
+    SceneObject,
+    Term,
+    View,
+    nearest_on_outline,
+)
 from uwbbench_datasets.simulator.materials import reflection
 from uwbbench_datasets.simulator.shapes import Face, faces
-from uwbbench_datasets.simulator.terms.echo import (
-    CylinderEcho,
-    PlateEcho,
-    PlateParams,
-    PointEcho,
-    PointParams,
-)
+from uwbbench_datasets.simulator.terms.echo import CylinderEcho, PlateEcho, PlateParams, PointEcho, PointParams
 from uwbbench_datasets.simulator.terms.walls import mirrored, walls
 
 _ECHOES = (

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 from pydantic import Field
 
-from uwbbench.api import BoolArray, Params, Term, View
-from uwbbench.api.geometry import nearest_on_outline, segments_cross
+from uwbbench.api import BoolArray, Params, Term, View, nearest_on_outline, segments_cross
 
 
 class OcclusionParams(Params):

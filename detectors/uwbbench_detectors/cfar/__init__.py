@@ -1,0 +1,1 @@
+"""Thresholds of constant false-alarm rate."""

@@ -1,0 +1,1 @@
+"""Backgrounds, estimated and subtracted."""

@@ -1,0 +1,1 @@
+"""Runs of stages compiled into one search of a frame."""

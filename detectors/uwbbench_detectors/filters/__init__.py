@@ -1,0 +1,1 @@
+"""What keeps or drops detections: thresholds of one column, and selections within a frame."""

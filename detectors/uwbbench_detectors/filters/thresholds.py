@@ -1,0 +1,145 @@
+"""Filters: each keeps the detections whose value lies inside its limits, and none whose value is NaN."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import ClassVar, Self
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from uwbbench.api import Block, BoolArray, Filter, Limit, LimitFilter, Params, ports
+
+
+def _check_order(minimum: float | None, maximum: float | None, unit: str) -> None:
+    if minimum is not None and maximum is not None and minimum > maximum:
+        raise ValueError(f"minimum{unit} ({minimum:g}) lies above maximum{unit} ({maximum:g}): nothing could pass")
+
+
+class ProminenceFilterParams(Params):
+    """Least prominence."""
+
+    minimum: float = Field(
+        ge=0,
+        description="In units of the profile. With profile.minmax that is relative to the strongest tap, normally the "
+        "direct path: 6 dB more isolation between the antennas doubles every prominence, and a direct path 1 000 "
+        "times the target hides it at 0.05.",
+    )
+
+
+class ProminenceFilter(LimitFilter[ProminenceFilterParams]):
+    """Keep peaks that stand out of their surroundings (arXiv 2512.01018)."""
+
+    consumes: ClassVar[frozenset[str]] = ports("detections", "prominence")
+    limits: ClassVar[Mapping[str, Limit]] = {"minimum": Limit("prominence", "least")}
+    fidelity = "from-source"
+
+
+class WidthFilterParams(Params):
+    """Range of widths."""
+
+    minimum: float = Field(
+        ge=0,
+        description="In taps. No width at half prominence is below 0.5, so 0.10 and 0.20 filter nothing; 1 removes 39 "
+        "% of the peaks of white noise and 32 % of filter-correlated noise, 2 removes 82 % and 69 %.",
+    )
+    maximum: float | None = Field(None, gt=0, description="In taps; null: no limit.")
+
+    @model_validator(mode="after")
+    def _in_order(self) -> Self:
+        _check_order(self.minimum, self.maximum, "")
+        return self
+
+
+class WidthFilter(LimitFilter[WidthFilterParams]):
+    """Keep peaks as wide as the pulse (arXiv 2512.01018)."""
+
+    consumes: ClassVar[frozenset[str]] = ports("detections", "width_taps")
+    limits: ClassVar[Mapping[str, Limit]] = {
+        "minimum": Limit("width_taps", "least"),
+        "maximum": Limit("width_taps", "most"),
+    }
+    fidelity = "from-source"
+
+
+class SnrFilterParams(Params):
+    """Least score."""
+
+    minimum_db: float = Field(
+        description="In dB. With score.snr and white noise a tap at 45 ns passes 10 dB 33 % of the time, and 90 % of "
+        "frames of noise alone have a tap that does; 27 % at 15 dB, 1.6 % at 20 dB, 0.03 % at 25 dB."
+    )
+
+
+class SnrFilter(LimitFilter[SnrFilterParams]):
+    """Keep detections that stand above the noise (arXiv 2512.01018)."""
+
+    consumes: ClassVar[frozenset[str]] = ports("detections", "score_db")
+    limits: ClassVar[Mapping[str, Limit]] = {"minimum_db": Limit("score_db", "least")}
+    fidelity = "from-source"
+
+
+class PdoaFilterParams(Params):
+    """Largest phase difference."""
+
+    maximum_rad: float = Field(
+        2.1325,
+        ge=0,
+        description="Largest magnitude of the phase difference. The default is pi sin(0.95 pi / 4), 45 degrees from "
+        "boresight on channel 9; on channel 5 the same phase stands for 61 degrees.",
+    )
+
+
+class PdoaFilter(LimitFilter[PdoaFilterParams]):
+    """Keep detections inside the sector that the antenna pair resolves (arXiv 2512.01018)."""
+
+    consumes: ClassVar[frozenset[str]] = ports("detections", "pdoa_rad")
+    limits: ClassVar[Mapping[str, Limit]] = {"maximum_rad": Limit("pdoa_rad", "most", magnitude=True)}
+    fidelity = "from-source"
+
+
+class FirstPathFilterParams(Params):
+    """Distance from the direct path."""
+
+    guard_taps: float = Field(
+        1.0,
+        ge=0,
+        description="Detections must lie more than this behind the first path. With 1 the ringing of the antennas, 1 "
+        "to 3 ns behind the crest, beats a metal plate at 3.4 m in about 30 % of frames.",
+    )
+
+
+class FirstPathFilter(Filter[FirstPathFilterParams]):
+    """Keep detections behind the direct path (arXiv 2512.01018)."""
+
+    consumes: ClassVar[frozenset[str]] = ports("detections", "tap", "first_path")
+    fidelity = "from-source"
+
+    def keep(self, block: Block) -> BoolArray:
+        """Mask of the detections behind the guard."""
+        earliest = block.part("first_path")[block.rows] + self.params.guard_taps
+        return np.asarray(block.detections["tap"] > earliest)
+
+
+class RangeFilterParams(Params):
+    """Span of ranges."""
+
+    minimum_m: float | None = Field(None, description="Nearest range; null: no limit.")
+    maximum_m: float | None = Field(None, description="Farthest range; null: no limit.")
+
+    @model_validator(mode="after")
+    def _limits_something(self) -> Self:
+        if self.minimum_m is None and self.maximum_m is None:
+            raise ValueError("give minimum_m, maximum_m or both")
+        _check_order(self.minimum_m, self.maximum_m, "_m")
+        return self
+
+
+class RangeFilter(LimitFilter[RangeFilterParams]):
+    """Keep detections within a span of ranges."""
+
+    consumes: ClassVar[frozenset[str]] = ports("detections", "range_m")
+    limits: ClassVar[Mapping[str, Limit]] = {
+        "minimum_m": Limit("range_m", "least"),
+        "maximum_m": Limit("range_m", "most"),
+    }

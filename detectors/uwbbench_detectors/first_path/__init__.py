@@ -1,0 +1,1 @@
+"""The direct path: its estimators, and frames aligned on it."""

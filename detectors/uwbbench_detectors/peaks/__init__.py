@@ -1,0 +1,1 @@
+"""Noise floor, profile, peaks of it, their score, and places between taps."""

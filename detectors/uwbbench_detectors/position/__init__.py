@@ -1,0 +1,1 @@
+"""From a delay and a phase to range, azimuth and place."""

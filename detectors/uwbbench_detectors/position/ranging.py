@@ -1,0 +1,141 @@
+"""Range from delay, and position from range and azimuth."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+from pydantic import Field
+
+from uwbbench.api import (
+    SPEED_OF_LIGHT_M_S,
+    Block,
+    ConfigError,
+    Params,
+    Radar,
+    Stage,
+    bistatic_range,
+    bistatic_range_sine,
+    direction,
+    ports,
+    receiver_pose,
+    to_world,
+)
+
+PAPER_BIAS_M = {5: 0.15, 9: 0.13}
+"""Distance offsets of arXiv 2512.01018 by channel."""
+ROUNDED_SPEED_M_S = 3.0e8
+
+
+class RangeParams(Params):
+    """How a delay becomes a range."""
+
+    geometry: Literal["exact", "paper"] = Field(
+        "exact",
+        description="'exact' holds for any place of the transmitter; 'paper' is the printed sine form, right only for "
+        "a transmitter beside the receiver on its right, and long by about 10 cm for one 20 cm behind it.",
+    )
+    includes_baseline: bool = Field(
+        True,
+        description="Path d = c tau + D: the direct path that delays count from has flown the baseline D already. "
+        "false takes d = c tau, which shortens ranges by about D/2.",
+    )
+    bias_m: float | Literal["paper"] = Field(
+        0.0, description="Calibration offset that is subtracted; 'paper' is 0.15 on channel 5 and 0.13 on channel 9."
+    )
+    speed_of_light: Literal["exact", "rounded"] = Field(
+        "exact", description="'rounded' is 3e8 m/s: 0.24 cm more at 3.4 m."
+    )
+
+
+class Range(Stage[RangeParams]):
+    """Delay and range of each detection.
+
+    The delay is ``(tap - first path) * sample interval``. Detections without an azimuth are taken to lie at boresight.
+    The range is NaN where the path would be shorter than the baseline, which no target can cause.
+
+    Raises
+    ------
+    ConfigError
+        For ``bias_m: paper`` on a capture of neither channel 5 nor 9.
+
+    References
+    ----------
+    arXiv 2512.01018 (sine form and offsets); law of cosines in the triangle transmitter, target, receiver
+    (:func:`uwbbench.api.geometry.bistatic_range`).
+    """
+
+    consumes = ports("frames", "first_path", "detections", "tap")
+    produces = ports("delay_s", "range_m")
+    rowwise = True
+    fidelity = "from-source"
+
+    def open(self, radar: Radar) -> None:
+        """Look up the bias of the radar's channel."""
+        super().open(radar)
+        bias = self.params.bias_m
+        if bias == "paper":
+            if radar.channel not in PAPER_BIAS_M:
+                raise ConfigError(
+                    f"range: bias_m 'paper' is known for channels 5 and 9; the capture's channel is {radar.channel}: "
+                    "give a number in metres"
+                )
+            bias = PAPER_BIAS_M[radar.channel]
+        self.bias_m = bias
+
+    @property
+    def speed_ratio(self) -> float:
+        """Speed that is assumed, over the speed of light."""
+        return 1.0 if self.params.speed_of_light == "exact" else ROUNDED_SPEED_M_S / SPEED_OF_LIGHT_M_S
+
+    def step(self, block: Block) -> Block:
+        """Block whose detections carry ``delay_s`` and ``range_m``."""
+        radar = self.radar
+        delay_s = (block.detections["tap"] - block.part("first_path")[block.rows]) * radar.sample_interval_s
+        flown_s = delay_s * self.speed_ratio
+        if self.params.includes_baseline:
+            excess_m = radar.excess_m(flown_s)
+        else:
+            excess_m = flown_s * SPEED_OF_LIGHT_M_S - radar.baseline_length_m
+        azimuth_rad = np.nan_to_num(block.detections.azimuth_rad, nan=0.0)
+        if self.params.geometry == "exact":
+            range_m = bistatic_range(excess_m, direction(azimuth_rad), radar.baseline_m)
+        else:
+            range_m = bistatic_range_sine(excess_m, azimuth_rad, radar.baseline_length_m)
+        return block.with_columns(delay_s=delay_s, range_m=range_m - self.bias_m)
+
+
+class PositionParams(Params):
+    """Which pose carries detections into the world."""
+
+    use_odometry: bool = Field(
+        False, description="Use the robot's drifting odometry instead of the reference pose, where the capture has it."
+    )
+
+
+class Position(Stage[PositionParams]):
+    """World position of each detection: robot pose, then mount, then range and azimuth (arXiv 2512.01018).
+
+    Targets are taken to stand at the receiver's height. Where odometry is asked for and the capture has none, the
+    reference pose is used and the results say so.
+    """
+
+    consumes = ports("frames", "detections", "range_m", "azimuth_rad")
+    produces = ports("x_m", "y_m")
+    rowwise = True
+    fidelity = "from-source"
+
+    def step(self, block: Block) -> Block:
+        """Block whose detections carry ``x_m`` and ``y_m``."""
+        frames, rows = block.frames, block.rows
+        position_m, yaw_rad = frames.position_m, frames.yaw_rad
+        if self.params.use_odometry:
+            if frames.odometry_position_m is None or frames.odometry_yaw_rad is None:
+                self.note("position: the capture has no odometry, so the reference pose was used")
+            else:
+                position_m, yaw_rad = frames.odometry_position_m, frames.odometry_yaw_rad
+        receiver_m, boresight_rad = receiver_pose(
+            position_m[rows], yaw_rad[rows], np.asarray(self.radar.mount_position_m), self.radar.mount_yaw_rad
+        )
+        points_m = to_world(block.detections.range_m, block.detections.azimuth_rad, receiver_m, boresight_rad)
+        return block.with_columns(x_m=points_m[:, 0], y_m=points_m[:, 1])

@@ -1,0 +1,57 @@
+"""Memory that a long stream keeps."""
+
+import sys
+
+import numpy as np
+import pytest
+
+from uwbbench.api import Capture
+from uwbbench.detect.pipeline import load_detector
+from uwbbench.measure.latency import memory
+
+
+class Keeping:
+    """A detector that keeps some bytes of every frame."""
+
+    needs: frozenset[str] = frozenset()
+
+    def __init__(self, bytes_a_frame: int) -> None:
+        self.bytes_a_frame, self.kept = bytes_a_frame, []
+
+    def open(self, _: Capture) -> "Keeping":
+        self.kept: list[object] = []
+        return self
+
+    def step(self, _: object) -> None:
+        self.kept.append(np.zeros(self.bytes_a_frame, np.uint8))
+
+
+def test_what_a_stream_keeps_of_each_frame_is_found(approach: Capture) -> None:
+    found = memory.growth(Keeping(4000), approach, approach.frames(0, 40))  # type: ignore[arg-type]
+    assert found["memory_growth_bytes"] == pytest.approx(4e6, rel=0.1)
+    assert found["growth_frames"] == memory.MEASURED_FRAMES
+
+
+def test_a_stream_that_keeps_nothing_does_not_grow(approach: Capture) -> None:
+    found = memory.growth(load_detector("null"), approach, approach.frames(0, 40))
+    assert found["memory_growth_bytes"] is not None
+    assert found["memory_growth_bytes"] < 5000
+
+
+def test_a_slow_detector_is_watched_for_fewer_frames(approach: Capture, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(memory, "LIMIT_S", 0.01)
+    monkeypatch.setattr(memory, "MEASURED_FRAMES", 10**7)
+    found = memory.growth(Keeping(4000), approach, approach.frames(0, 40))  # type: ignore[arg-type]
+    assert found["growth_frames"] is not None
+    assert 0 < found["growth_frames"] < 10**6
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="not told by Windows")
+def test_the_peak_holds_what_was_touched() -> None:
+    before = memory.resident_bytes()
+    held = np.ones(64 << 20, np.uint8)
+    assert memory.peak_bytes() > held.nbytes
+    if before is not None:
+        now = memory.resident_bytes()
+        assert now is not None
+        assert now - before > held.nbytes / 2

@@ -1,0 +1,131 @@
+"""The hard cases: shipped and rarer detectors stand them, and detectors with a fault do not."""
+
+import re
+
+import pytest
+
+from uwbbench import load_detector
+from uwbbench.api.locate import shipped
+from uwbbench.measure.robustness import all_cases, case_named, examine
+from uwbbench.measure.robustness.subject import Subject
+
+PATH = "{use: first_path.crest}"
+NOISE = "{use: noise_floor}"
+PEAKS = "{use: peaks}"
+SNR = "{use: score.snr}"
+RANGE = "{use: range}"
+
+
+@pytest.mark.parametrize("name", sorted(shipped("detectors")))
+def test_a_shipped_detector_stands_every_case(name):
+    found = examine(load_detector(name))
+    assert [(one.case, one.detail) for one in found.outcomes if one.status == "failed"] == []
+    assert (found.largest_error_m or 0.0) <= 1e-9
+    assert found.usual_hits >= (0.0 if name in ("null", "constant") else 0.85)
+
+
+@pytest.mark.parametrize(
+    "name", ["greatest of", "smallest of", "all frames so far", "running median", "adaptive average"]
+)
+def test_a_detector_of_rarer_stages_stands_every_case(rare_detectors, name):
+    found = examine(rare_detectors[name])
+    assert [(one.case, one.detail) for one in found.outcomes if one.status == "failed"] == []
+
+
+@pytest.mark.parametrize("case", all_cases(), ids=lambda case: case.name)
+def test_every_case_applies_to_some_shipped_detector(case):
+    names = ("paper", "cfar-ca", "background-svd", "background-mean", "paper-subsample", "background-ema")
+    assert "passed" in {case.judge(Subject(load_detector(name))).status for name in names}
+
+
+def test_cases_have_names_of_their_own_and_say_what_they_expect():
+    cases = all_cases()
+    assert len({case.name for case in cases}) == len(cases) >= 60
+    assert all(case.statement.endswith(".") and case.expectation for case in cases)
+
+
+# Faults that the cases are there to find
+
+
+@pytest.mark.parametrize(
+    ("case", "says", "steps"),
+    [
+        ("direct-path-120-db-above-the-floor", "detections behind tap", ["{use: cfar.running_sums}"]),
+        (
+            "values-on-a-filter-limit",
+            r"\[True, False, True\]",
+            [PATH, NOISE, "{use: profile.minmax}", PEAKS, SNR, "{use: filter.snr.passes_nan}", RANGE],
+        ),
+        (
+            "score-against-no-noise",
+            "1 of 3 detections kept, with scores .nan.|2 of 3 detections kept, with scores",
+            [
+                PATH,
+                NOISE,
+                "{use: profile.minmax}",
+                PEAKS,
+                "{use: score.snr.infinite}",
+                "{use: filter.snr, params: {minimum_db: 9}}",
+            ],
+        ),
+        (
+            "zero-noise-taps",
+            "infinite score_db",
+            [PATH, NOISE, "{use: profile.minmax}", PEAKS, "{use: score.snr.infinite}", RANGE],
+        ),
+        (
+            "full-phase-in-the-arcsine",
+            "nan",
+            [PATH, "{use: profile.minmax}", PEAKS, "{use: pdoa}", "{use: azimuth.unclipped}", RANGE],
+        ),
+        (
+            "phase-difference-of-pi",
+            "expected -pi throughout",
+            [PATH, "{use: profile.minmax}", PEAKS, "{use: pdoa.product}", RANGE],
+        ),
+        ("zero-frames", "RuntimeWarning", [PATH, "{use: profile.naive}", PEAKS, RANGE]),
+        ("rippled-constant-frames", "detections of rounding errors", [PATH, "{use: profile.naive}", PEAKS, RANGE]),
+        ("ill-conditioned-window", "units of the clutter off", ["{use: clutter.svd.gram}", "{use: cfar.ca}"]),
+        (
+            "map-coordinates",
+            "points",
+            [
+                PATH,
+                "{use: profile.minmax}",
+                PEAKS,
+                "{use: pdoa}",
+                "{use: azimuth}",
+                RANGE,
+                "{use: position}",
+                "{use: dbscan.plane}",
+            ],
+        ),
+        ("zero-frames", "hold no echo", ["{use: echo.of_nan}"]),
+        ("constant-capture", "where nothing is", ["{use: echo.of_nan}"]),
+    ],
+    ids=lambda value: value if isinstance(value, str) else "",
+)
+def test_a_fault_is_found(faulty, make_detector, judged, case, says, steps):
+    outcome = judged(case, make_detector(*steps))
+    assert outcome.status == "failed"
+    assert re.search(says, outcome.detail), outcome.detail
+
+
+def test_a_stage_that_raises_fails_the_case_and_no_other(install_plugin, make_detector):
+    source = """
+from uwbbench.api import Params, Stage, ports
+
+class Fragile(Stage[Params]):
+    consumes = ports("frames")
+    produces = ports("detections")
+
+    def step(self, block):
+        if len(block.frames) == 1:
+            raise ValueError("one frame is not enough")
+        return block
+"""
+    install_plugin("fragile", {"stages": {"fragile": "uwbbench_fragile:Fragile"}}, {"uwbbench_fragile.py": source})
+    cases = [case_named("one-frame-capture"), case_named("zero-capture")]
+    one, other = examine(make_detector("{use: fragile}"), cases).outcomes
+    assert (one.status, one.detail) == ("failed", "ValueError: one frame is not enough")
+    assert other.status == "passed"

@@ -1,0 +1,45 @@
+"""Every shipped detector that has thresholds can be swept, also those that look at many frames."""
+
+import numpy as np
+import pytest
+
+from uwbbench.api import registry
+from uwbbench.api.filters import LimitFilter
+from uwbbench.api.locate import shipped
+from uwbbench.detect.pipeline import load_detector
+from uwbbench.tools.tune.sweep.sweep import Sweep
+
+
+def thresholds(detector, capture):
+    """Three thresholds of each of the first three limited columns, taken from the peaks."""
+    peaks = detector.run(capture).candidates
+    grid = {}
+    for step in detector.config.steps:
+        stage = registry.load_plugin("stages", step.use)
+        for name, limit in stage.limits.items() if issubclass(stage, LimitFilter) else ():
+            values = np.abs(peaks[limit.column])
+            if name in step.params and np.isfinite(values).any():
+                values = np.quantile(values[np.isfinite(values)], [0.2, 0.6, 0.9], method="nearest")
+                grid[f"pipeline.{step.label}.params.{name}"] = values.tolist()
+    return dict(list(grid.items())[:3])
+
+
+SWEEPABLE = [
+    name
+    for name in shipped("detectors")
+    if any(step.use in ("filter.snr", "filter.prominence", "filter.width") for step in load_detector(name).config.steps)
+]
+
+
+@pytest.mark.parametrize("name", SWEEPABLE)
+def test_every_set_of_a_shipped_detector_equals_running_it(short, name):
+    detector, capture = load_detector(name), short(9, True)
+    clusters = [step.label for step in detector.config.steps if step.use == "dbscan"]
+    sweep = Sweep(detector, thresholds(detector, capture), leave_out=clusters)
+    swept = sweep.run(capture)
+    for index in range(0, len(sweep), 2):
+        expected, found = sweep.detector(index).run(capture, fused=False), swept.detections(index)
+        assert np.array_equal(found.frame, sweep.detector(index).run(capture).frame)
+        for column in expected.columns:
+            assert np.array_equal(found[column], expected[column], equal_nan=True), column
+    assert len(set(swept.retained.tolist())) > 1  # the thresholds matter

@@ -1,0 +1,127 @@
+"""Finding plugins by name, without importing any before one is asked for.
+
+Plugins are entry points of six groups: stages, datasets, metrics, terms and kernels are classes; a detector is a YAML
+file in a package, named ``package.module:file.yaml``. Built-in plugins are registered in the same way.
+"""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+from dataclasses import dataclass
+from functools import cache
+from importlib.metadata import Distribution, entry_points
+from pathlib import Path
+from typing import Any, Literal
+
+from uwbbench.api.errors import PluginError, nearest
+
+Kind = Literal["stages", "datasets", "metrics", "terms", "kernels", "detectors"]
+KINDS: tuple[Kind, ...] = ("stages", "detectors", "datasets", "metrics", "terms")
+"""Kinds whose names people write in files; kernels step in by themselves."""
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One registered name.
+
+    Attributes
+    ----------
+    name : str
+    target : str
+        ``module:attribute``.
+    package : str
+        Distribution and version that registers it.
+    rivals : tuple of str
+        Other packages that register the same name: such a name cannot be used.
+    """
+
+    name: str
+    target: str
+    package: str
+    rivals: tuple[str, ...] = ()
+
+
+@cache
+def _package(distribution: Distribution | None) -> str:
+    """Name and version; read once for all that a distribution registers, as that takes longer than the rest."""
+    if distribution is None:
+        return "unknown package"
+    facts = distribution.metadata
+    return f"{facts['Name']} {facts['Version']}"
+
+
+@cache
+def entries(kind: Kind) -> dict[str, Entry]:
+    """All registered names of a kind, sorted; imports nothing."""
+    found: dict[str, Entry] = {}
+    for point in sorted(entry_points(group=f"uwbbench.{kind}"), key=lambda point: point.name):
+        mine = Entry(point.name, point.value, _package(point.dist))
+        other = found.get(point.name)
+        if other is None:
+            found[point.name] = mine
+        elif (other.target, other.package) != (mine.target, mine.package):  # one distribution seen twice on the path
+            found[point.name] = Entry(other.name, other.target, other.package, (*other.rivals, mine.package))
+    return found
+
+
+def entry(kind: Kind, name: str) -> Entry:
+    """Entry of a name.
+
+    Raises
+    ------
+    PluginError
+        If the name is unknown or claimed by two packages.
+    """
+    known = entries(kind)
+    if name not in known:
+        raise PluginError(f"no {kind[:-1]} named '{name}' is installed.{nearest(name, known)}")
+    found = known[name]
+    if found.rivals:
+        packages = ", ".join((found.package, *found.rivals))
+        raise PluginError(f"{kind[:-1]} '{name}' is registered by several packages ({packages}); uninstall all but one")
+    return found
+
+
+@cache
+def load_plugin(kind: Literal["stages", "datasets", "metrics", "terms", "kernels"], name: str) -> type[Any]:
+    """Class behind a name.
+
+    Raises
+    ------
+    PluginError
+        If the name is unknown, claimed twice, or its module cannot be imported; other plugins stay usable.
+    """
+    found = entry(kind, name)
+    module, _, attribute = found.target.partition(":")
+    try:
+        loaded = getattr(importlib.import_module(module), attribute)
+    except Exception as error:  # whatever a plugin's import raises is that plugin's fault alone
+        cause = f"{type(error).__name__}: {error}"
+        raise PluginError(
+            f"{kind[:-1]} '{name}' of {found.package} cannot be loaded from {found.target}: {cause}"
+        ) from error
+    if not isinstance(loaded, type):
+        raise PluginError(f"{kind[:-1]} '{name}' of {found.package}: {found.target} is not a class")
+    return loaded
+
+
+def detector_file(name: str) -> Path:
+    """YAML file of a detector that a package registers.
+
+    Raises
+    ------
+    PluginError
+        If the name is unknown or claimed twice, or the file is not in the package.
+    """
+    found = entry("detectors", name)
+    module, _, filename = found.target.partition(":")
+    try:
+        spec = importlib.util.find_spec(module)
+    except Exception as error:  # finding a module imports the packages above it, which may raise anything
+        raise PluginError(f"detector '{name}' of {found.package}: no package {module} ({error})") from error
+    folders = list(spec.submodule_search_locations or []) if spec else []
+    for folder in folders:
+        if (Path(folder) / filename).is_file():
+            return Path(folder) / filename
+    raise PluginError(f"detector '{name}' of {found.package}: no file {filename} in package {module}")

@@ -1,5 +1,0 @@
-"""Two runs side by side: what changed in what went in, then in what came out, then in which frames."""
-
-from uwbbench.comparison.compare import Comparison, compare
-
-__all__ = ["Comparison", "compare"]

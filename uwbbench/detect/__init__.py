@@ -1,0 +1,1 @@
+"""A detector at work: stages chained into a pipeline, and its stream."""

@@ -1,0 +1,306 @@
+"""A detector assembled from stages: checked, opened on a receiver, run as a batch."""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import json
+from collections.abc import Iterator, Mapping
+from functools import cache
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from uwbbench.api import registry
+from uwbbench.api.block import Block
+from uwbbench.api.capture import Capture, CaptureHeader
+from uwbbench.api.detections import COLUMNS, Detections
+from uwbbench.api.errors import ConfigError, PluginError
+from uwbbench.api.kernel import Kernel
+from uwbbench.api.stage import Stage
+from uwbbench.config.detector import DetectorConfig, detector_from_text, read_detector
+from uwbbench.detect.sources import source_hash
+from uwbbench.detect.stream import Opened, Stream
+
+BATCH_FRAMES = 4096
+"""Frames a block of :meth:`Pipeline.run`: large enough to be fast, small enough for a million frames."""
+
+_NEEDS = {
+    "sts": "STS responses of two antennas",
+    "truth": "ground truth",
+    "first_path": "reported first path",
+}
+
+
+class Pipeline:
+    """A detector: stages with checked ports.
+
+    Parameters
+    ----------
+    config : DetectorConfig
+        Validated detector file.
+
+    Raises
+    ------
+    ConfigError
+        If a stage uses what no earlier stage produces.
+    """
+
+    def __init__(self, config: DetectorConfig) -> None:
+        self.config = config
+        self._check_ports()
+
+    @property
+    def name(self) -> str:
+        """Name in tables and reports."""
+        return self.config.name
+
+    def __repr__(self) -> str:
+        return f"Pipeline({self.name}: {' -> '.join(step.label for step in self.config.steps)})"
+
+    def _repr_html_(self) -> str:
+        return str(import_module("uwbbench.show.notebook").detector(self))
+
+    def _check_ports(self) -> None:
+        available = {"frames"}
+        makers: dict[str, str] = {}
+        for step in self.config.steps:
+            for port in registry.load_plugin("stages", step.use).produces:
+                makers.setdefault(port, step.label)
+        for step in self.config.steps:
+            stage = registry.load_plugin("stages", step.use)
+            for port in sorted(stage.consumes - available):
+                if port in makers:
+                    hint = f"step '{makers[port]}' makes it, but stands later, or its result is gone by then"
+                else:
+                    hint = (
+                        f"no step makes it; put one of these before it: {', '.join(_makers_of(port)) or 'none known'}"
+                    )
+                place = f"{step.place}: " if step.place else ""
+                raise ConfigError(f"{place}detector '{self.name}': step '{step.label}' needs '{port}': {hint}")
+            available = (available - stage.removes) | stage.produces
+        if "detections" not in available:
+            raise ConfigError(f"detector '{self.name}': no step produces detections")
+
+    def open(self, capture: CaptureHeader, *, audit: bool = False, fused: bool = True, threads: int = 1) -> Stream:
+        """Start a stream on a receiver.
+
+        Parameters
+        ----------
+        capture : Capture or CaptureHeader
+            Gives the radar; its samples are not touched.
+        audit : bool
+            Keep what the filters drop, in ``stream.rejected``.
+        fused : bool
+            Let kernels take over the runs of stages that they know. They find the same; an audit goes without.
+        threads : int
+            Threads that a kernel may share a long block among.
+
+        Raises
+        ------
+        ConfigError
+            If the capture lacks what a stage needs and the stage is not optional.
+        """
+        steps, notes = self._opened(capture)
+        if fused and not audit:
+            steps = _fused(steps, notes, threads)
+        return Stream(steps, notes, audit=audit)
+
+    def _opened(self, capture: CaptureHeader) -> tuple[list[Opened], list[str]]:
+        """The stages, opened on the receiver, and what a reader of the results must know of them."""
+        radar = capture.radar
+        counted_from_transmission = radar.first_tap_delay_s is not None
+        has = {
+            name
+            for name, there in (
+                ("sts", radar.has_sts),
+                ("truth", capture.truth is not None),
+                ("first_path", radar.has_first_path or counted_from_transmission),
+            )
+            if there
+        }
+        available = {"frames"}
+        stages, notes = [], []
+        missing: dict[str, str] = {}  # port that a step left out would have made: what the capture lacks for it
+        left_out: dict[str, list[str]] = {}
+        for step in self.config.steps:
+            cls = registry.load_plugin("stages", step.use)
+            params, fallen = step.params_for(radar.channel)
+            if step.implied_by:
+                notes.append(f"{step.label}: put before '{step.implied_by}', which needs it, with its defaults")
+            given = f"channel {radar.channel}" if radar.channel else "a capture without channel"
+            notes += [f"{step.label}: no {name} for {given}, used {params[name]}" for name in fallen]
+            lacks = [_NEEDS.get(need, need) for need in sorted(cls.needs - has)]
+            lacks += [missing.get(port, port) for port in sorted(cls.consumes - available)]
+            lacks = list(dict.fromkeys(lacks))
+            if lacks and step.optional:
+                reason = ", no ".join(lacks)
+                left_out.setdefault(reason, []).append(step.label)
+                missing |= dict.fromkeys(cls.produces, reason)
+                continue
+            if lacks:
+                where = f"detector '{self.name}', step '{step.label}'"
+                raise ConfigError(f"{where}: capture '{capture.name}' has no {', no '.join(lacks)}")
+            stage: Stage[Any] = cls(cls.params_type().model_validate(params))
+            stage.open(radar)
+            if "truth" in cls.needs and capture.truth is not None:
+                stage.show_truth(capture.truth, capture.trajectory)
+            available = (available - stage.removes) | stage.produces
+            stages.append(Opened(step.label, stage))
+        notes += [f"left out, as the capture has no {reason}: {', '.join(names)}" for reason, names in left_out.items()]
+        return stages, notes
+
+    def run(self, capture: Capture, *, candidates: bool = False, fused: bool = True, threads: int = 1) -> Detections:
+        """Detect on a whole capture.
+
+        Parameters
+        ----------
+        capture : Capture
+        candidates : bool
+            Find the peaks before the filters in the same run; otherwise they are found when somebody asks.
+        fused, threads
+            As in :meth:`open`.
+
+        Returns
+        -------
+        Detections
+            What the stream yields for the same frames, all blocks and the flush together.
+        """
+        stream = self.open(capture, audit=candidates, fused=fused, threads=threads)
+        parts = [stream.step(frames) for frames in capture.blocks(BATCH_FRAMES, sts="sts" in stream.needs)]
+        found = Detections.join([*parts, stream.flush()])
+        if not len(found):  # an empty table has the columns that a full one would have
+            found = found.with_columns(**{name: () for name in COLUMNS if name in stream.ports})
+        found = found.annotated(notes=stream.notes)
+        if candidates:
+            return found.annotated(candidates=_candidates(found, stream.rejected), chain=stream.chain)
+
+        @cache
+        def audited() -> Detections:
+            return self.run(capture, candidates=True)
+
+        return found.annotated(
+            candidates=lambda: _known(audited().candidates),
+            chain=(lambda: audited().chain) if stream.fused else stream.chain,
+        )
+
+    def signals(self, capture: Capture) -> Iterator[Block]:
+        """Blocks as the first stage that makes detections finds them: what it searches, for people to look at.
+
+        Parameters
+        ----------
+        capture : Capture
+
+        Yields
+        ------
+        Block
+            Frames without clutter, ``first_path``, ``noise_rms`` and ``profile``, as far as the detector makes them.
+        """
+        opened, _ = self._opened(capture)
+        first = next(place for place, step in enumerate(opened) if "detections" in step.stage.produces)
+        stream = Stream(opened[:first], [])
+        for frames in capture.blocks(BATCH_FRAMES):
+            yield stream.through(Block(frames.without_invalid()))
+        yield from stream.tails()
+
+    @property
+    def identity(self) -> str:
+        """SHA-256 over the resolved configuration and the sources of its stages."""
+        text = json.dumps({"detector": self.config.to_dict(), "sources": self.sources}, sort_keys=True)
+        return hashlib.sha256(text.encode()).hexdigest()
+
+    @property
+    def sources(self) -> dict[str, str]:
+        """SHA-256 of the sources of each stage, and of the kernels that may stand for some, by name."""
+        found = {
+            step.use: source_hash(registry.load_plugin("stages", step.use).__module__) for step in self.config.steps
+        }
+        for name in registry.entries("kernels"):
+            with contextlib.suppress(PluginError):  # one that cannot be loaded is not used
+                found[f"kernel {name}"] = source_hash(registry.load_plugin("kernels", name).__module__)
+        return found
+
+
+def _makers_of(port: str) -> list[str]:
+    """Installed stages that produce a port; those that cannot be loaded are passed over."""
+    found = []
+    for name in registry.entries("stages"):
+        with contextlib.suppress(PluginError):
+            if port in registry.load_plugin("stages", name).produces:
+                found.append(name)
+    return found
+
+
+def _known(candidates: Detections | None) -> Detections:
+    return Detections.empty() if candidates is None else candidates
+
+
+def _candidates(found: Detections, rejected: Detections) -> Detections:
+    """Peaks before the filters, with ``retained`` 1 for those that passed them all, else ``rejected_by``."""
+    kept = found.with_columns(retained=np.ones(len(found)), rejected_by=np.full(len(found), np.nan))
+    dropped = rejected.with_columns(retained=np.zeros(len(rejected)))
+    return Detections.join([kept, dropped])
+
+
+def _fused(steps: list[Opened], notes: list[str], threads: int) -> list[Opened]:
+    """Steps with kernels in place of the runs that they know."""
+    kernels: list[type[Kernel]] = []
+    for name in registry.entries("kernels"):
+        try:
+            kernels.append(registry.load_plugin("kernels", name))
+        except PluginError as error:  # the plain stages do the same
+            notes.append(f"not used: {error}")
+    fused: list[Opened] = []
+    place = 0
+    while place < len(steps):
+        stages = [step.stage for step in steps[place:]]
+        covered, kernel = max(
+            ((kind.covers(stages), kind) for kind in kernels), key=lambda found: found[0], default=(0, None)
+        )
+        if kernel is None or covered < 2 or _kept_inside(stages[:covered]) & _wanted(stages[covered:]):
+            fused.append(steps[place])
+            place += 1
+            continue
+        label = " + ".join(step.label for step in steps[place : place + covered])
+        fused.append(Opened(label, kernel(stages[:covered], threads, notes if place == 0 else ())))
+        place += covered
+    return fused
+
+
+def _kept_inside(stages: list[Stage[Any]]) -> frozenset[str]:
+    """Ports about frames that these stages make, which a kernel keeps to itself."""
+    made = frozenset[str]().union(*(stage.produces for stage in stages))
+    return made & {"first_path", "noise", "profile"}
+
+
+def _wanted(stages: list[Stage[Any]]) -> frozenset[str]:
+    return frozenset[str]().union(*(stage.wanted for stage in stages))
+
+
+def load_detector(
+    name: str | Path, relative_to: Path | None = None, changes: Mapping[str, Any] | None = None
+) -> Pipeline:
+    """Load a detector.
+
+    Parameters
+    ----------
+    name : str or path
+        A shipped or registered name, or a path to a detector YAML.
+    relative_to : Path, optional
+        Folder that a relative path starts from.
+    changes : mapping, optional
+        Values to change, by path, for example ``{"pipeline.filter.width.params.minimum": 2}``.
+
+    Raises
+    ------
+    ConfigError, PluginError
+        If the file is missing or wrong.
+    """
+    return Pipeline(read_detector(str(name), relative_to, changes))
+
+
+def detector_from_yaml(text: str) -> Pipeline:
+    """Detector from YAML text; handy in notebooks and tests."""
+    return Pipeline(detector_from_text(text))

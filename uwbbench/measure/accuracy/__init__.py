@@ -1,0 +1,1 @@
+"""Which detections are true, and the numbers made of it."""

@@ -1,0 +1,246 @@
+"""Scoring: the numbers of one detector on one capture.
+
+What is true, false and missed is the affair of :mod:`uwbbench.measure.accuracy.judge`, whose conventions hold here;
+what each number means that of :mod:`uwbbench.measure.accuracy.metrics`. The two tables are those of arXiv 2512.01018:
+after filtering, and after mapping.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from importlib import import_module
+from typing import Any, get_args
+
+from uwbbench.api.capture import CaptureHeader
+from uwbbench.api.detections import Detections
+from uwbbench.api.errors import nearest
+from uwbbench.api.metric import Outcome
+from uwbbench.measure.accuracy.judge import SCORINGS, Region, Scene, Scoring, ScoringRules, Table, Verdict, judge
+from uwbbench.measure.accuracy.metrics.detection import F1, FalseAlarmsPerMinute, Precision, Recall
+from uwbbench.measure.accuracy.metrics.error import (
+    Bias,
+    MeanAbsoluteError,
+    Percentile90,
+    Percentile95,
+    StandardDeviation,
+    matched_only,
+)
+from uwbbench.measure.accuracy.stats import evaluate
+
+__all__ = ["SCORINGS", "Region", "ScoreBlock", "Scores", "Scoring", "ScoringRules", "outcomes", "score", "tables_of"]
+
+
+@dataclass(frozen=True)
+class ScoreBlock:
+    """One table of scores. A number that is undefined is NaN.
+
+    Attributes
+    ----------
+    precision, recall, f1 : float
+    mae_m, p90_m, p95_m, sd_m : float
+        Of the absolute errors of all retained detections (:mod:`uwbbench.measure.accuracy.metrics.error`).
+    tp, fp, fn, retained : int
+    matched_mae_m, matched_p90_m : float
+        Of true positives only; the recall beside them is the match rate.
+    bias_m : float
+        Mean signed error of all retained detections.
+    true_empty : int
+        Frames with nothing to find and nothing found; not part of any ratio.
+    duplicates, structure, unmatched : int
+        Retained detections counted apart; duplicates are false positives too, unless the truth is not exhaustive.
+    chance_recall : float
+        Recall of as many uniformly random ranges of the region in each frame, with a shared match allowed. NaN in the
+        mapping table and in ``peak``, whose recall has no such chance level.
+    false_alarms_per_minute : float
+    recall_with_blind_zone : float
+        Recall where the region starts at 0 m.
+    frames, unprocessed : int
+        Scored frames, and labelled ones that no detector has processed.
+    exhaustive : bool
+        Whether the truth names all that is visible.
+    """
+
+    precision: float
+    recall: float
+    f1: float
+    mae_m: float
+    p90_m: float
+    p95_m: float
+    sd_m: float
+    tp: int
+    fp: int
+    fn: int
+    retained: int
+    matched_mae_m: float
+    matched_p90_m: float
+    bias_m: float
+    true_empty: int
+    duplicates: int
+    structure: int
+    unmatched: int
+    chance_recall: float
+    false_alarms_per_minute: float
+    recall_with_blind_zone: float
+    frames: int
+    unprocessed: int
+    exhaustive: bool
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values for JSON, None where a number is undefined."""
+        values = dataclasses.asdict(self)
+        return {k: None if isinstance(v, float) and math.isnan(v) else v for k, v in values.items()}
+
+
+@dataclass(frozen=True)
+class Scores:
+    """Scores of one detector on one capture.
+
+    A table is also ``scores["filtering"]``; the filtering table's numbers are also attributes: ``scores.f1``.
+
+    Attributes
+    ----------
+    rules : ScoringRules
+    filtering : ScoreBlock
+    mapping : ScoreBlock or None
+        None where the detector does not cluster positions.
+    outcomes : mapping of str to Outcome
+        Of each table: what intervals are made of.
+    """
+
+    rules: ScoringRules
+    filtering: ScoreBlock
+    mapping: ScoreBlock | None = None
+    outcomes: Mapping[str, Outcome] = field(default_factory=dict, repr=False, compare=False)
+
+    def __repr__(self) -> str:
+        block, rules = self.filtering, self.rules
+        counts = f"{block.tp} true, {block.fp} false, {block.fn} missed"
+        return f"Scores({rules.scoring}, gate {rules.gate_m:g} m: {counts}, F1 {block.f1:.3f}, MAE {block.mae_m:.3f} m)"
+
+    def _repr_html_(self) -> str:
+        return str(import_module("uwbbench.show.notebook").scores(self))
+
+    def __getitem__(self, table: str) -> ScoreBlock | None:
+        if table not in get_args(Table):
+            raise KeyError(f"no table '{table}'.{nearest(table, get_args(Table))}")
+        block: ScoreBlock | None = getattr(self, table)
+        return block
+
+    def __getattr__(self, name: str) -> Any:
+        block = self.__dict__.get("filtering")  # absent while an instance is being unpickled
+        if block is None or name not in block.__dict__:
+            raise AttributeError(f"scores have no '{name}'")
+        return getattr(block, name)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values for JSON."""
+        return {
+            "scoring": self.rules.scoring,
+            "gate_m": self.rules.gate_m,
+            "filtering": self.filtering.to_dict(),
+            "mapping": None if self.mapping is None else self.mapping.to_dict(),
+        }
+
+
+def score(
+    found: Detections,
+    capture: CaptureHeader,
+    scoring: Scoring = "frame",
+    gate_m: float = 0.20,
+    region: Region | None = None,
+    strongest: int | None = None,
+) -> Scores:
+    """Score detections against the ground truth of their capture.
+
+    Parameters
+    ----------
+    found : Detections
+        With ``range_m``; with ``x_m``, ``y_m`` and ``cluster`` too for the mapping table.
+    capture : Capture or CaptureHeader
+        Its samples are not touched.
+    scoring : {"frame", "peak", "object"}
+    gate_m : float
+        Largest error of a true detection, inclusive.
+    region : Region, optional
+    strongest : int, optional
+        Score only that many detections of a frame.
+
+    Returns
+    -------
+    Scores
+
+    Raises
+    ------
+    ScoringError
+        If the capture has no truth, the detections are of another capture or lack a range, ``peak`` is asked for and
+        the peaks before the filters are not known, or a parameter is not allowed.
+    """
+    rules = ScoringRules(scoring, gate_m, region or Region(), strongest)
+    scene = Scene.of(found, capture)
+    verdicts = {table: judge(found, scene, rules, table) for table in tables_of(found)}
+    blocks = {table: _block(found, scene, rules, table, verdict) for table, verdict in verdicts.items()}
+    kept: dict[str, Outcome] = {table: verdict.outcome for table, verdict in verdicts.items()}
+    return Scores(rules, blocks["filtering"], blocks.get("mapping"), kept)
+
+
+def outcomes(found: Detections, header: CaptureHeader, rules: ScoringRules) -> dict[str, Outcome]:
+    """Outcome of each table, to merge over captures and to resample.
+
+    Parameters
+    ----------
+    found : Detections
+    header : CaptureHeader
+    rules : ScoringRules
+
+    Returns
+    -------
+    dict of str to Outcome
+        ``filtering``, and ``mapping`` where the detections are clustered.
+
+    Raises
+    ------
+    ScoringError
+        As :func:`score`.
+    """
+    scene = Scene.of(found, header)
+    return {table: judge(found, scene, rules, table).outcome for table in tables_of(found)}
+
+
+def tables_of(found: Detections) -> tuple[Table, ...]:
+    """Tables that detections can be judged by: ``mapping`` only where they are clustered."""
+    mapped = all(column in found for column in ("cluster", "x_m", "y_m"))
+    return ("filtering", "mapping") if mapped else ("filtering",)
+
+
+def _block(found: Detections, scene: Scene, rules: ScoringRules, table: Table, verdict: Verdict) -> ScoreBlock:
+    everywhere = dataclasses.replace(rules, region=dataclasses.replace(rules.region, min_range_m=0.0))
+    whole, matched = [verdict.outcome], [matched_only(verdict.outcome)]
+    return ScoreBlock(
+        precision=evaluate(Precision, whole),
+        recall=evaluate(Recall, whole),
+        f1=evaluate(F1, whole),
+        mae_m=evaluate(MeanAbsoluteError, whole),
+        p90_m=evaluate(Percentile90, whole),
+        p95_m=evaluate(Percentile95, whole),
+        sd_m=evaluate(StandardDeviation, whole),
+        tp=int(verdict.outcome.tp.sum()),
+        fp=int(verdict.outcome.fp.sum()),
+        fn=int(verdict.outcome.fn.sum()),
+        retained=len(verdict.outcome.error_m),
+        matched_mae_m=evaluate(MeanAbsoluteError, matched),
+        matched_p90_m=evaluate(Percentile90, matched),
+        bias_m=evaluate(Bias, whole),
+        true_empty=verdict.true_empty,
+        duplicates=verdict.duplicates,
+        structure=verdict.structure,
+        unmatched=verdict.unmatched,
+        chance_recall=verdict.chance_recall,
+        false_alarms_per_minute=evaluate(FalseAlarmsPerMinute, whole),
+        recall_with_blind_zone=evaluate(Recall, [judge(found, scene, everywhere, table).outcome]),
+        frames=len(verdict.outcome.group),
+        unprocessed=scene.unprocessed,
+        exhaustive=scene.truth.exhaustive,
+    )

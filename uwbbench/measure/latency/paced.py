@@ -1,0 +1,120 @@
+"""Frames handed out at the radar's own rate, as on a robot: the process sleeps in between, and its caches go cold.
+
+Conventions
+-----------
+* A frame is due at a fixed time. The loop sleeps until shortly before, then watches the clock, as a sleep alone ends
+  some 0.1 ms late. What it starts late nevertheless is the harness's lateness: kept apart, never the detector's.
+* A frame is made after the sleep, as by a driver that has just received it: its samples are the only thing that is not
+  cold.
+* The deadline of a frame is the next frame. A detector that takes longer makes the next frame wait, and the wait
+  counts: the response of a frame is its call and what earlier calls left undone when it was due.
+"""
+
+from __future__ import annotations
+
+import time
+from time import perf_counter_ns
+from typing import Any
+
+import numpy as np
+
+from uwbbench.api.arrays import FloatArray
+from uwbbench.api.capture import Capture
+from uwbbench.api.frames import Frames
+from uwbbench.detect.pipeline import Pipeline
+from uwbbench.measure.latency.latency import call_summary, miss_summary
+from uwbbench.measure.latency.loops import endless, quiet
+
+SPIN_S = 0.3e-3
+"""The clock is watched for this long: longer than sleeps end late, short enough that the loop leaves caches alone."""
+
+LATE_START_US = 10.0
+"""A frame started later than this was started late by the harness."""
+
+
+def paced_pass(
+    pipeline: Pipeline, capture: Capture, whole: Frames, rate_hz: float, seconds: float
+) -> tuple[FloatArray, FloatArray]:
+    """Hand out frames at a rate, for a while, to one stream.
+
+    Parameters
+    ----------
+    pipeline : Pipeline
+        Warmed up before.
+    capture : Capture
+    whole : Frames
+        Preloaded; starts again where it is shorter than that.
+    rate_hz, seconds : float
+
+    Returns
+    -------
+    times_us : (frames,) array
+        Time of every call.
+    lateness_us : (frames,) array
+        From the moment at which the call could have started (the frame was due and the detector free) to its start.
+    """
+    stream = pipeline.open(capture)
+    step, source = stream.step, endless(whole, 1 / rate_hz, renumbered="truth" not in stream.needs)
+    count = max(1, round(seconds * rate_hz))
+    period_ns, spin_ns = 1e9 / rate_hz, min(SPIN_S, 0.25 / rate_hz) * 1e9
+    times_ns, lateness_ns = np.empty(count), np.empty(count)
+    with quiet():
+        begin = perf_counter_ns() + int(period_ns)
+        ended = begin
+        for number in range(count):
+            due = begin + int(number * period_ns)
+            idle_ns = due - perf_counter_ns() - spin_ns
+            if idle_ns > 0:
+                time.sleep(idle_ns * 1e-9)
+            frames = next(source)
+            start = perf_counter_ns()
+            while start < due:
+                start = perf_counter_ns()
+            step(frames)
+            free, ended = max(due, ended), perf_counter_ns()
+            times_ns[number], lateness_ns[number] = ended - start, start - free
+    return times_ns * 1e-3, lateness_ns * 1e-3
+
+
+def responses_us(times_us: FloatArray, period_us: float) -> FloatArray:
+    """Time (frames,) from each frame being due to its answer, as if every start had been on time.
+
+    A queue with one server and a fixed rate of arrival; its waiting times follow from the calls alone (D. V. Lindley,
+    The theory of queues with a single server, 1952).
+
+    Examples
+    --------
+    >>> responses_us(np.array([1.0, 15.0, 1.0, 1.0]), period_us=10.0).tolist()
+    [1.0, 15.0, 6.0, 1.0]
+    """
+    found = np.empty(len(times_us))
+    left_us = 0.0
+    for number, time_us in enumerate(times_us):
+        found[number] = left_us + time_us
+        left_us = max(0.0, found[number] - period_us)
+    return found
+
+
+def paced_summary(times_us: FloatArray, lateness_us: FloatArray, rate_hz: float) -> dict[str, Any]:
+    """Numbers of a paced pass.
+
+    Returns
+    -------
+    dict
+        Those of :func:`~uwbbench.measure.latency.latency.call_summary` with missed deadlines by response, ``rate_hz``,
+        ``p50_period_share`` and ``p99_period_share`` of the frame period, ``late_starts`` of the harness, and
+        ``lateness_p50_us``, ``lateness_p99_us``, ``lateness_max_us``.
+    """
+    period_us = 1e6 / rate_hz
+    summary = call_summary(times_us, period_us) | miss_summary(responses_us(times_us, period_us), period_us)
+    p99_us = summary["p99_us"]
+    return {
+        "rate_hz": rate_hz,
+        **summary,
+        "p50_period_share": summary["p50_us"] / period_us,
+        "p99_period_share": None if p99_us is None else p99_us / period_us,
+        "late_starts": int((lateness_us > LATE_START_US).sum()),
+        "lateness_p50_us": float(np.median(lateness_us)),
+        "lateness_p99_us": float(np.percentile(lateness_us, 99)),
+        "lateness_max_us": float(lateness_us.max()),
+    }

@@ -1,0 +1,236 @@
+"""The process that measures: reads what to measure from standard input, writes the result as JSON.
+
+Run as ``python -m uwbbench.measure.latency.worker``. Threads of numerical libraries are limited by environment
+variables, which the parent sets, as some libraries read them only when they are imported.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from pathlib import Path
+from time import perf_counter
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import yaml
+
+if TYPE_CHECKING:
+    from uwbbench.api.arrays import BoolArray, FloatArray
+    from uwbbench.api.capture import Capture
+    from uwbbench.api.frames import Frames
+    from uwbbench.detect.pipeline import Pipeline
+
+
+def main() -> int:
+    """Measure once."""
+    from uwbbench.api.errors import UwbbenchError
+
+    answer = os.fdopen(os.dup(1), "w")
+    os.dup2(2, 1)  # whatever a plugin prints must not end up in the answer
+    spec = yaml.safe_load(sys.stdin)
+    core = _pin()
+    try:
+        result = _measured(spec, core)
+    except UwbbenchError as error:
+        sys.stderr.write(f"{error}\n")
+        return 2
+    with answer:
+        json.dump(result, answer)
+    return 0
+
+
+def _pin() -> int | None:
+    """Keep this process on one core, so that it never moves to a cold cache; None where the system cannot."""
+    if not hasattr(os, "sched_setaffinity"):
+        return None
+    core = max(os.sched_getaffinity(0))  # interrupts tend to be served by the first
+    os.sched_setaffinity(0, {core})
+    return core
+
+
+def _measured(spec: dict[str, Any], core: int | None) -> dict[str, Any]:
+    from uwbbench.api.errors import CaptureError
+    from uwbbench.config.source import CaptureRef
+    from uwbbench.measure.latency import loops, memory
+    from uwbbench.measure.latency.compilations import undisturbed
+    from uwbbench.measure.latency.machine import load
+
+    load_before = load()
+    pipeline = _pipeline(spec["detector"])
+    opening = perf_counter()
+    capture = CaptureRef(**{**spec["capture"], "roots": tuple(spec["capture"]["roots"])}).open()
+    whole = capture.frames(0, spec["frames"])
+    opening_s = perf_counter() - opening
+    if len(whole) == 0:
+        raise CaptureError(f"capture '{capture.name}' has no frames; there is nothing to time")
+    stream = pipeline.open(capture)
+    stream.step(whole.part(0, 1))
+    startup_s = perf_counter() - spec["started"] - opening_s
+
+    warmed = loops.warm_up(pipeline, capture, whole, spec["warmup_windows"])
+    notes = [] if warmed else ["warm-up windows never agreed within 5 %"]
+    if len(capture) > len(whole):
+        notes.append(f"timed the first {len(whole)} of {len(capture)} frames")
+    calls, compiled_in_calls = _calls(pipeline, capture, whole)
+    peak_memory_bytes = memory.peak_bytes()
+    batch_us, compiled_in_batch = undisturbed(lambda: loops.batch_times_us(pipeline, capture, whole))
+    paced, compiled_in_paced = _paced(pipeline, capture, whole, spec)
+    preempted = calls["quality"].get("involuntary_switches", 0)
+    if preempted > 0.01 * calls["n"]:
+        notes.append(f"other processes took the core {preempted} times in {calls['n']} calls: tails are partly theirs")
+    ratio, compiled_in_pair = _ratio(pipeline, capture, whole, spec)
+    compilations = compiled_in_calls + compiled_in_batch + compiled_in_paced + compiled_in_pair
+    if compilations:
+        notes.append("code was compiled during the timed passes: some times hold that of the compiler")
+    instructions, instructions_note = _instructions(pipeline, capture, whole)
+    null = _pipeline(NULL)
+    loops.warm_up(null, capture, whole, spec["warmup_windows"])
+    overhead_us, _, _ = loops.stream_pass(null, capture, whole)
+    growth = memory.growth(pipeline, capture, whole)
+    os_threads, threads = _os_threads(), _threads()
+    if threads > 1:
+        notes.append(f"a numerical library would use {threads} threads")
+    return {
+        **calls,
+        "throughput_us": float(np.median(batch_us)),
+        "throughput_best_us": float(batch_us.min()),
+        "overhead_us": float(np.median(overhead_us)),
+        "clock_us": loops.clock_us(),
+        "startup_s": startup_s,
+        "peak_memory_bytes": peak_memory_bytes,
+        "ratio_to_reference": ratio,
+        **paced,
+        "instructions_per_frame": instructions,
+        "instructions_note": instructions_note,
+        **growth,
+        "warmed": warmed,
+        "threads": threads,
+        **_surroundings(core),
+        "quality": {
+            **calls["quality"],
+            "compilations": compilations,
+            "load_before": load_before,
+            "load_after": load(),
+            "os_threads": os_threads,
+        },
+        "notes": notes,
+    }
+
+
+def _calls(pipeline: Pipeline, capture: Capture, whole: Frames) -> tuple[dict[str, Any], int]:
+    """The stream, one frame a call, and how often something was compiled in it."""
+    from uwbbench.measure.latency import latency, loops
+    from uwbbench.measure.latency.compilations import undisturbed
+    from uwbbench.measure.latency.counters import Usage
+
+    def once() -> tuple[FloatArray, BoolArray | None, float, dict[str, int]]:
+        before = Usage.now()
+        passed = loops.stream_pass(pipeline, capture, whole)
+        after = Usage.now()
+        return *passed, {} if before is None or after is None else after.since(before)
+
+    (times_us, clustered, flush_us, usage), compilations = undisturbed(once)
+    found = {
+        **latency.call_summary(times_us, 1e6 / capture.radar.frame_rate_hz),
+        **latency.kinds_summary(times_us, clustered),
+        "amortised_us": float(times_us.sum() + flush_us) / len(times_us),
+        "quality": usage,
+        "times_us": times_us.tolist(),
+    }
+    return found, compilations
+
+
+def _paced(pipeline: Pipeline, capture: Capture, whole: Frames, spec: dict[str, Any]) -> tuple[dict[str, Any], int]:
+    """Frames at a fixed rate, where that was asked for, and how often something was compiled meanwhile."""
+    from uwbbench.measure.latency import paced
+    from uwbbench.measure.latency.compilations import undisturbed
+
+    if spec["paced_s"] is None:
+        return {}, 0
+    rate_hz = spec["rate_hz"] or capture.radar.frame_rate_hz
+    (times_us, lateness_us), compilations = undisturbed(
+        lambda: paced.paced_pass(pipeline, capture, whole, rate_hz, spec["paced_s"]), tries=1
+    )
+    summary = paced.paced_summary(times_us, lateness_us, rate_hz)
+    return {"paced": summary, "paced_times_us": times_us.tolist()}, compilations
+
+
+def _ratio(
+    pipeline: Pipeline, capture: Capture, whole: Frames, spec: dict[str, Any]
+) -> tuple[dict[str, Any] | None, int]:
+    """Alternating with the reference, where there is one, and how often something was compiled meanwhile."""
+    from uwbbench.measure.latency import loops, pairing
+    from uwbbench.measure.latency.compilations import undisturbed
+
+    if spec["reference"] is None:
+        return None, 0
+    reference = _pipeline(spec["reference"])
+    loops.warm_up(reference, capture, whole, spec["warmup_windows"])
+    turns, compilations = undisturbed(lambda: pairing.alternating(pipeline, reference, capture, whole, spec["blocks"]))
+    ratio = pairing.ratio_summary(turns.first_s, turns.second_s)
+    disturbed = int(np.count_nonzero(turns.waited_s))
+    return {"reference": reference.name, **ratio, "disturbed_blocks": disturbed}, compilations
+
+
+def _instructions(pipeline: Pipeline, capture: Capture, whole: Frames) -> tuple[float | None, str]:
+    """Instructions a frame, in a pass of its own."""
+    from uwbbench.measure.latency import loops
+    from uwbbench.measure.latency.counters import counted
+
+    step, calls = pipeline.open(capture).step, loops.cut(whole, 1)
+
+    def work() -> None:
+        for frames in calls:
+            step(frames)
+
+    with loops.quiet():
+        count, note = counted(work)
+    return None if count is None else count / len(calls), note
+
+
+NULL = {"schema": 1, "name": "null", "pipeline": [{"use": "reference.nothing"}]}
+
+
+def _pipeline(data: dict[str, Any]) -> Pipeline:
+    from uwbbench.api.yaml_file import YamlFile
+    from uwbbench.config.detector import check_detector
+    from uwbbench.detect.pipeline import Pipeline
+
+    return Pipeline(check_detector(data, YamlFile(f"detector '{data['name']}'", data, {})))
+
+
+def _surroundings(core: int | None) -> dict[str, Any]:
+    from uwbbench.measure.latency.machine import machine, versions
+
+    about = machine()
+    # The process may use one core by now; what is told is the machine.
+    del about["usable_cores"]
+    return {
+        "pinned": core is not None,
+        "cpu": about["cpu"],
+        "machine": {**about, "core": core, "versions": versions()},
+    }
+
+
+def _threads() -> int:
+    """Most threads that any loaded numerical library would use."""
+    from threadpoolctl import threadpool_info
+
+    found = [int(pool["num_threads"]) for pool in threadpool_info()]
+    if "numba" in sys.modules:
+        import numba
+
+        found.append(int(numba.get_num_threads()))
+    return max(found, default=1)
+
+
+def _os_threads() -> int | None:
+    """Threads that this process really has; None where the system does not tell."""
+    tasks = Path("/proc/self/task")
+    return len(list(tasks.iterdir())) if tasks.is_dir() else None
+
+
+if __name__ == "__main__":
+    sys.exit(main())

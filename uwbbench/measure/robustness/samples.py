@@ -1,0 +1,348 @@
+"""Hard samples: nothing, too much, too little, not a number, and other number formats."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from fractions import Fraction
+
+import numpy as np
+
+from uwbbench.api.arrays import ComplexArray
+from uwbbench.api.capture import Capture
+from uwbbench.api.detections import Detections
+from uwbbench.api.frames import magnitude
+from uwbbench.measure.robustness.case import Evidence, NotApplicable, Violation, case
+from uwbbench.measure.robustness.compare import exact_ulps, flipped_share, hit_share, in_frames, still_found, unchanged
+from uwbbench.measure.robustness.scene import FRAMES, NOISE, NOISE_TAPS, TAPS, altered, approach, chosen
+from uwbbench.measure.robustness.subject import Subject, block_of, through
+
+DAMAGED = np.array([0, 41, 97, 98, 99, 100, 101, FRAMES - 1])
+"""The first frame, one alone, a run, and the last one."""
+INTACT = np.setdiff1d(np.arange(FRAMES), DAMAGED)
+EXACT_M = 1e-9
+
+
+def _damaged(capture: Capture, value: complex) -> Capture:
+    """Capture whose damaged frames hold one value throughout."""
+
+    def damage(samples: ComplexArray) -> ComplexArray:
+        samples[DAMAGED] = value
+        return samples
+
+    return altered(capture, damage)
+
+
+def _nothing_there(found: Detections) -> None:
+    if np.isin(found.frame, DAMAGED).any():
+        raise Violation(f"{np.isin(found.frame, DAMAGED).sum()} detections in frames that hold no echo")
+
+
+def _nothing_but(subject: Subject, found: Detections) -> Evidence:
+    """The damaged frames yield nothing, and the intact ones what they yield on their own."""
+    _nothing_there(found)
+    for step in subject.pipeline.config.steps:
+        if step.use == "clutter.svd" and step.params.get("every", 1) != 1:
+            raise NotApplicable("clutter.svd works on every n-th frame of the capture, which are others without these")
+    return unchanged(in_frames(found, INTACT), subject.run(chosen(subject.capture, INTACT)), EXACT_M)
+
+
+@case("reject")
+def zero_frames(subject: Subject) -> Evidence:
+    """All-zero frames, alone and in a run, yield nothing; the others yield what they do without them.
+
+    A frame of zeros is what a transceiver hands out when reception failed. Nothing may be divided by its maximum, and
+    it may not enter a background.
+    """
+    return _nothing_but(subject, subject.run_altered(_damaged(subject.capture, 0.0)))
+
+
+@case("reject")
+def zero_capture(subject: Subject) -> Evidence:
+    """A capture of zeros alone yields nothing."""
+    return _nothing(subject, 0.0)
+
+
+@case("reject")
+def constant_frames(subject: Subject) -> Evidence:
+    """Frames of one constant, alone and in a run, yield nothing; of other detections one in twenty may come or go.
+
+    Min-max scaling of a constant is 0/0, and its direct path stands 0 dB above its noise. Unlike a frame of zeros it
+    may count as a measurement: a running median of the noise takes it in, and a decision near a limit then changes.
+    """
+    found = subject.run_altered(_damaged(subject.capture, 0.3 - 0.2j))
+    _nothing_there(found)
+    return _hardly_flipped(in_frames(found, INTACT), subject.run(chosen(subject.capture, INTACT)), 0.05)
+
+
+@case("reject")
+def constant_capture(subject: Subject) -> Evidence:
+    """A capture of one constant alone yields nothing."""
+    return _nothing(subject, 0.3 - 0.2j)
+
+
+def _nothing(subject: Subject, value: complex) -> Evidence:
+    found = subject.run_altered(altered(subject.capture, lambda samples: np.full_like(samples, value)))
+    if len(found):
+        raise Violation(f"{len(found)} detections where nothing is")
+    return Evidence("no detections")
+
+
+@case("reject")
+def rippled_constant_frames(subject: Subject) -> Evidence:
+    """Constant frames with a ripple of one unit in the last place yield nothing.
+
+    Scaled to the span from 0 to 1 the ripple would be a full-scale peak.
+    """
+
+    def rippled(samples: ComplexArray) -> ComplexArray:
+        samples[:] = 0.3
+        samples[:, 9::5] = np.nextafter(0.3, 1)
+        return samples
+
+    found = subject.run_altered(altered(subject.capture, rippled))
+    if len(found):
+        raise Violation(f"{len(found)} detections of rounding errors")
+    return Evidence("no detections")
+
+
+@case("survive")
+def zero_noise_taps(subject: Subject) -> Evidence:
+    """Leading taps that are exactly zero make no score infinite and nothing not a number.
+
+    A ratio to no noise measures nothing. A detector that needs the ratio may drop the detection; one that takes its
+    noise elsewhere goes on.
+    """
+
+    def silenced(samples: ComplexArray) -> ComplexArray:
+        samples[:, :NOISE_TAPS] = 0
+        return samples
+
+    capture = altered(subject.capture, silenced)
+    found = subject.run_altered(capture)
+    return Evidence(f"{len(found)} detections, echo found in {hit_share(found, capture):.0%} of frames")
+
+
+@case("equal")
+def vanishing_noise(subject: Subject) -> Evidence:
+    """Noise of amplitude 5e-23 in single precision, whose square is zero there, is measured to 4 units.
+
+    All samples are equal, so that their root mean square is the magnitude of one of them, and so is their median,
+    which counts for 1 / sqrt(ln 2) of it. In single precision the squares vanish, the noise would be zero and every
+    score infinite.
+    """
+    stage = subject.stage("noise_floor")
+    quiet = np.complex64(3e-23 + 4e-23j)
+    expected = math.hypot(float(quiet.real), float(quiet.imag))
+    if stage.params.method == "median":
+        expected /= math.sqrt(math.log(2))
+    level = float(through(stage, block_of(np.full((1, TAPS), quiet))).part("noise_rms")[0])
+    error_ulp = abs(level - expected) / math.ulp(expected)
+    if not error_ulp <= 4:
+        raise Violation(f"noise of {level:.3g}, expected {expected:.3g}")
+    return Evidence(f"noise of {level:.3g}", error_ulp=error_ulp)
+
+
+@case("survive")
+def dc_offset(subject: Subject) -> Evidence:
+    """With an offset of half the noise on every sample the echo is found as often, within a tenth of the frames."""
+    capture = altered(subject.capture, lambda samples: samples + NOISE / 2 * (1 + 1j) / np.sqrt(2))
+    found = subject.run_altered(capture)
+    return Evidence(still_found(found, capture, hit_share(subject.usual, subject.capture), 0.10))
+
+
+def _clipped(samples: ComplexArray, limit: float) -> ComplexArray:
+    return np.asarray(np.clip(samples.real, -limit, limit) + 1j * np.clip(samples.imag, -limit, limit))
+
+
+@case("survive")
+def clipped_samples(subject: Subject) -> Evidence:
+    """With I and Q clipped at the height of the direct path the echo is found in all but a tenth of the usual frames.
+
+    The limit of 0.9 cuts the crests of the frames whose phase puts them on one axis, and makes plateaus of them.
+    """
+    capture = altered(subject.capture, lambda samples: _clipped(samples, 0.9))
+    found = subject.run_altered(capture)
+    return Evidence(still_found(found, capture, hit_share(subject.usual, subject.capture), 0.10))
+
+
+@case("survive")
+def hard_clipped_samples(subject: Subject) -> Evidence:
+    """Samples clipped to three tenths of the direct path yield no infinity and no value that is not a number.
+
+    So far into saturation the direct path is a plateau of no known delay, phase or gain, and finding the echo is not
+    asked for.
+    """
+    capture = altered(subject.capture, lambda samples: _clipped(samples, 0.3))
+    found = subject.run_altered(capture)
+    return Evidence(f"{len(found)} detections, echo found in {hit_share(found, capture):.0%} of frames")
+
+
+@case("reject")
+def nan_samples(subject: Subject) -> Evidence:
+    """Frames with one sample that is not a number yield nothing; the others yield what they do without them."""
+    return _single_sample(subject, np.nan)
+
+
+@case("reject")
+def infinite_samples(subject: Subject) -> Evidence:
+    """Frames with one infinite sample yield nothing; the others yield what they do without them."""
+    return _single_sample(subject, np.inf)
+
+
+def _single_sample(subject: Subject, value: float) -> Evidence:
+    preamble = np.array(subject.capture.preamble)
+    preamble[DAMAGED, 3 + 5 * np.arange(len(DAMAGED))] = value
+    return _nothing_but(subject, subject.run(dataclasses.replace(subject.capture, preamble=preamble)))
+
+
+@case("reject")
+def nan_frames(subject: Subject) -> Evidence:
+    """Frames that are not a number throughout, in all responses, yield nothing and leave no trace."""
+    return _nothing_but(subject, subject.run(_damaged(subject.capture, complex(np.nan, -np.inf))))
+
+
+@case("reject")
+def nan_capture(subject: Subject) -> Evidence:
+    """A capture without one valid frame yields nothing, and processes nothing."""
+    found = subject.run(altered(subject.capture, lambda samples: np.full_like(samples, np.nan)))
+    if len(found) or len(found.processed):
+        raise Violation(f"{len(found)} detections, {len(found.processed)} frames processed")
+    return Evidence("no detections, no frames processed")
+
+
+@case("survive")
+def denormal_capture(subject: Subject) -> Evidence:
+    """A capture at 1e-310, below the least normal number, yields no infinity and no value that is not a number.
+
+    Samples hold a few digits there, so that nothing is asked of what is found.
+    """
+    found = subject.run_altered(altered(subject.capture, lambda samples: samples * 1e-310))
+    return Evidence(f"{len(found)} detections")
+
+
+@case("survive")
+def denormal_noise(subject: Subject) -> Evidence:
+    """Leading taps at the least number there is yield no infinite score, and nothing that is not a number."""
+
+    def quieted(samples: ComplexArray) -> ComplexArray:
+        samples[:, :NOISE_TAPS] = 5e-324
+        return samples
+
+    found = subject.run_altered(altered(subject.capture, quieted))
+    return Evidence(f"{len(found)} detections")
+
+
+@case("equal")
+def denormals_kept(subject: Subject) -> Evidence:
+    """After a run the process still computes with denormals: half of the least normal number is not zero.
+
+    Code compiled with fast-math flushes them for the whole process, and breaks comparisons with NaN.
+    """
+    subject.run(subject.capture)
+    half = np.array([np.finfo(float).tiny]) / 2
+    if not half[0] > 0 or np.array([np.nan])[0] == np.nan:
+        raise Violation("denormals are flushed to zero: something in this process was compiled with fast-math")
+    return Evidence("denormals are numbers")
+
+
+def _scaled(subject: Subject, factor: float) -> Evidence:
+    found = subject.run_altered(altered(subject.capture, lambda samples: samples * factor))
+    return unchanged(found, subject.usual, EXACT_M)
+
+
+@case("equal")
+def amplitudes_times_1e_minus_150(subject: Subject) -> Evidence:
+    """Samples times 1e-150 yield the same detections, within 1 nm: no power may underflow."""
+    return _scaled(subject, 1e-150)
+
+
+@case("equal")
+def amplitudes_times_1e150(subject: Subject) -> Evidence:
+    """Samples times 1e150 yield the same detections, within 1 nm: no power may overflow."""
+    return _scaled(subject, 1e150)
+
+
+def _hardly_flipped(found: Detections, expected: Detections, limit: float) -> Evidence:
+    share = flipped_share(found, expected)
+    told = f"{share:.2%} of the detections come or go"
+    if share > limit:
+        raise Violation(told, flips=share)
+    return Evidence(told, flips=share)
+
+
+@case("equal")
+def int16_range(subject: Subject) -> Evidence:
+    """I/Q rounded to the range of 16-bit integers yields the same detections but for one in fifty."""
+
+    def rounded(samples: ComplexArray) -> ComplexArray:
+        steps = samples * (32767 / 1.5)
+        return _clipped(np.rint(steps.real) + 1j * np.rint(steps.imag), 32767.0)
+
+    return _hardly_flipped(subject.run_altered(altered(subject.capture, rounded)), subject.usual, 0.02)
+
+
+def _stored(samples: ComplexArray) -> ComplexArray:
+    return np.asarray(samples, np.complex64)
+
+
+@case("equal")
+def single_precision(subject: Subject) -> Evidence:
+    """Samples stored as complex64 yield the same detections as complex128, but for one in a hundred."""
+    return _hardly_flipped(subject.run_altered(altered(subject.capture, _stored)), subject.usual, 0.01)
+
+
+@case("equal")
+def one_ulp_noise(subject: Subject) -> Evidence:
+    """Moving every stored number to one of its neighbours changes at most one detection in a hundred.
+
+    Up or down at random, from a fixed seed, by one unit in the last place of complex64.
+    """
+    rng = np.random.default_rng(7)
+
+    def moved(samples: ComplexArray) -> ComplexArray:
+        parts = _stored(samples).view(np.float32)
+        towards = rng.choice(np.array([-np.inf, np.inf], np.float32), parts.shape)
+        return np.asarray(np.nextafter(parts, towards).view(np.complex64))
+
+    stored = subject.run_altered(altered(subject.capture, _stored))
+    return _hardly_flipped(subject.run(altered(subject.capture, moved)), stored, 0.01)
+
+
+@case("equal")
+def magnitudes_of_integers(subject: Subject) -> Evidence:  # noqa: ARG001  (all detectors share the magnitude)
+    """Magnitudes of integer I/Q pairs are those of exact arithmetic within half a unit, and equal for equal powers.
+
+    The C library's hypot, behind ``np.abs``, gives unequal magnitudes for about a quarter of such pairs, so that
+    plateaus come and go. Every detector takes its magnitudes from one function of the framework, which is what runs.
+    """
+    real, imaginary = np.meshgrid(np.arange(1, 160), np.arange(1, 160))
+    pairs = (real + 1j * imaginary).astype(np.complex64).ravel()
+    found = magnitude(pairs)
+    power = (real * real + imaginary * imaginary).ravel()
+    order = np.argsort(power, kind="stable")
+    equal = np.diff(power[order]) == 0
+    if np.any(np.diff(found[order])[equal] != 0):
+        raise Violation("pairs of equal power have unequal magnitudes")
+    squared = exact_ulps(found[:500], [_root(int(value)) for value in power[:500]])
+    if squared > 0.5:
+        raise Violation(f"magnitudes are {squared:.2g} units off")
+    return Evidence(f"{int(equal.sum())} pairs of equal power; magnitudes within {squared:.2g} units")
+
+
+def _root(value: int) -> Fraction:
+    """Square root to 30 digits, by integer arithmetic."""
+    return Fraction(math.isqrt(value * 10**60), 10**30)
+
+
+@case("survive")
+def direct_path_thousandfold(subject: Subject) -> Evidence:
+    """A direct path 60 dB above its usual height yields nothing infinite; the echo may be lost beside it.
+
+    Min-max scaling ties every threshold to the direct path: at 1 000 times the target a prominence of 0.05 of the
+    direct path hides the target, as the prominence filter's description says. And no detector can remove a direct
+    path better than noise lets it be known.
+    """
+    capture = approach(direct=1000.0)
+    found = subject.run_altered(capture)
+    return Evidence(f"{len(found)} detections, echo found in {hit_share(found, capture):.0%} of frames")

@@ -1,1 +1,0 @@
-"""Pictures of captures, detectors and runs, for print: see :data:`uwbbench.plot.draw.KINDS`."""

@@ -1,0 +1,198 @@
+"""The best and the worst capture of each dataset, to be looked at: what was there, and what each detector found.
+
+Conventions
+-----------
+* The detector that leads the dataset's first leaderboard decides: its capture of highest and of lowest F1, or of
+  recall where the truth is not exhaustive. Equal ones: the first by name.
+* A detection is *near* if it lies within the gate of a visible obstacle.
+* Long captures are thinned to what a picture can show; the counts are those of all frames and detections.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+
+from uwbbench.api.arrays import BoolArray, FloatArray, IntArray
+from uwbbench.api.capture import CaptureHeader
+from uwbbench.api.detections import Detections
+from uwbbench.measure.accuracy.judge import Scene
+from uwbbench.measure.accuracy.metrics.detection import F1, Recall
+from uwbbench.measure.accuracy.scoring import ScoringRules
+from uwbbench.measure.accuracy.stats import evaluate
+from uwbbench.results.results import Scored
+from uwbbench.run.folder.folder import RunFolder
+from uwbbench.run.folder.journal import Entry
+
+MOST_POINTS = 600
+MOST_DATASETS = 6
+
+
+@dataclass(frozen=True)
+class Marks:
+    """Detections of one detector on one capture.
+
+    Attributes
+    ----------
+    detector : str
+    time_s, range_m, x_m, y_m : (shown,) array
+        Positions are NaN where the detector gives none.
+    near : (shown,) bool array
+    count : int
+        Detections, of which every so many-th is shown.
+    """
+
+    detector: str
+    time_s: FloatArray
+    range_m: FloatArray
+    x_m: FloatArray
+    y_m: FloatArray
+    near: BoolArray
+    count: int
+
+    @property
+    def placed(self) -> bool:
+        """Whether any detection has a place in the world."""
+        return bool(np.isfinite(self.x_m).any())
+
+
+@dataclass(frozen=True)
+class Case:
+    """A capture to be looked at.
+
+    Attributes
+    ----------
+    which : {"best", "worst", "only"}
+    dataset, capture, capture_id : str
+    leader : str
+        The detector whose best or worst capture it is.
+    scoring, metric : str
+        By which scoring and metric.
+    score : float
+    header : CaptureHeader
+    time_s : (shown,) array
+        Time of the shown frames, since the first.
+    range_m : (shown, obstacles) array
+        True range of each obstacle; NaN where it is hidden or outside the sector that scores look at.
+    obstacles : tuple of str
+    path_m : (shown, 2) array
+    outlines_m : list of (name, structure, (vertices, 2) array)
+    marks : list of Marks
+    """
+
+    which: Literal["best", "worst", "only"]
+    dataset: str
+    capture: str
+    capture_id: str
+    leader: str
+    scoring: str
+    metric: str
+    score: float
+    header: CaptureHeader
+    time_s: FloatArray
+    range_m: FloatArray
+    obstacles: tuple[str, ...]
+    path_m: FloatArray
+    outlines_m: list[tuple[str, bool, FloatArray]]
+    marks: list[Marks]
+
+
+def cases(
+    folder: RunFolder, entries: Sequence[Entry], scored: Sequence[Scored], leaders: dict[tuple[str, str], str]
+) -> Iterator[Case]:
+    """Best and worst capture of each dataset.
+
+    Parameters
+    ----------
+    folder : RunFolder
+    entries : sequence of Entry
+        Accuracy entries that were done.
+    scored : sequence of Scored
+    leaders : dict
+        Leading detector of each dataset and source.
+    """
+    rule = folder.rules[0]
+    for (dataset, source), leader in list(leaders.items())[:MOST_DATASETS]:
+        chosen = [
+            one
+            for one in scored
+            if (one.dataset, one.source, one.detector) == (dataset, source, leader)
+            and (one.scoring, one.table) == (rule.scoring, "filtering")
+        ]
+        ranked = sorted(((*_score(one), one.capture) for one in chosen), key=lambda row: (-row[1], row[2]))
+        ranked = [row for row in ranked if not math.isnan(row[1])]
+        if not ranked:
+            continue
+        picks: list[tuple[Literal["best", "worst", "only"], tuple[str, float, str]]]
+        picks = [("best", ranked[0]), ("worst", ranked[-1])] if len(ranked) > 1 else [("only", ranked[0])]
+        for which, (metric, score, capture) in picks:
+            of_capture = [e for e in entries if (e.dataset, e.capture) == (dataset, capture)]
+            about = {"dataset": dataset, "capture": capture, "leader": leader, "which": which}
+            about |= {"metric": metric, "scoring": rule.scoring}
+            yield _case(folder, of_capture, rule, score, about)
+
+
+def _score(one: Scored) -> tuple[str, float]:
+    name, metric = ("f1", F1) if one.outcome.exhaustive else ("recall", Recall)
+    return name, evaluate(metric, [one.outcome])
+
+
+def _case(folder: RunFolder, entries: Sequence[Entry], rule: ScoringRules, score: float, about: dict[str, Any]) -> Case:
+    capture_id = entries[0].capture_id
+    header = folder.header(capture_id)
+    shown = _thinned(len(header))
+    since_s = header.trajectory.timestamp_s - header.trajectory.timestamp_s[:1]
+    things = header.truth.objects if header.truth is not None else ()
+    columns = [column for column, thing in enumerate(things) if not thing.structure]
+    marks = []
+    range_m = np.empty((len(shown), 0))
+    for entry in entries:
+        found = folder.detections(entry.unit)
+        scene = Scene.of(found, header)
+        visible = scene.visible(rule.region)
+        range_m = np.where(visible, scene.sight.range_m, np.nan)[shown][:, columns]
+        marks.append(_marks(entry.detector, found, since_s, scene, visible, rule))
+    return Case(
+        **about,
+        capture_id=capture_id,
+        score=score,
+        header=header,
+        time_s=since_s[shown],
+        range_m=range_m,
+        obstacles=tuple(things[column].name for column in columns),
+        path_m=header.trajectory.position_m[shown, :2],
+        outlines_m=[(thing.name, thing.structure, _outline(thing.outline_m, shown)) for thing in things],
+        marks=marks,
+    )
+
+
+def _outline(outline_m: FloatArray, shown: IntArray) -> FloatArray:
+    """Corners (vertices, 2); of a moving object the way of its middle (shown, 2)."""
+    flat = outline_m[..., :2]
+    return flat[shown].mean(axis=1) if flat.ndim == 3 else flat
+
+
+def _marks(
+    detector: str, found: Detections, since_s: FloatArray, scene: Scene, visible: BoolArray, rule: ScoringRules
+) -> Marks:
+    rows = _thinned(len(found))
+    error_m = np.abs(scene.errors_m(found, "filtering"))
+    near = np.any((error_m <= rule.gate_m) & visible[found.frame], axis=1)
+    none = np.full(len(rows), np.nan)
+    return Marks(
+        detector=detector,
+        time_s=since_s[found.frame[rows]],
+        range_m=found.range_m[rows] if "range_m" in found else none,
+        x_m=found["x_m"][rows] if "x_m" in found else none,
+        y_m=found["y_m"][rows] if "y_m" in found else none,
+        near=near[rows],
+        count=len(found),
+    )
+
+
+def _thinned(count: int) -> IntArray:
+    return np.arange(0, count, max(1, -(-count // MOST_POINTS)), dtype=np.int64)

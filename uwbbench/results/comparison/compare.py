@@ -1,0 +1,159 @@
+"""Comparing two runs, in the order in which one asks: what went in, what came out, which frames."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from uwbbench.api.errors import ConfigError, nearest
+from uwbbench.results.comparison.changes import Change, changes
+from uwbbench.results.comparison.flips import Flip, flips
+from uwbbench.results.comparison.scores import ScoreChange, TimeChange, score_changes, time_changes
+from uwbbench.results.comparison.units import shared
+from uwbbench.results.report import read_safely
+from uwbbench.run.folder.folder import RunFolder
+
+MOST_FLIPS = 20
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """What differs between two runs.
+
+    Attributes
+    ----------
+    first, second : RunFolder
+    changes : tuple of Change
+        In configuration, code, data and machine.
+    scores : tuple of ScoreChange
+    times : tuple of TimeChange
+    scoring : str
+        Of the flips.
+    compared_frames : int
+    flip_counts : mapping
+        By detector: frames from which outcome to which.
+    worst : tuple of Flip
+        The worst first.
+    notes : tuple of str
+        What was not compared, and what a reader must know.
+    """
+
+    first: RunFolder
+    second: RunFolder
+    changes: tuple[Change, ...]
+    scores: tuple[ScoreChange, ...]
+    times: tuple[TimeChange, ...]
+    scoring: str
+    compared_frames: int
+    flip_counts: Mapping[str, Counter[tuple[str, str]]]
+    worst: tuple[Flip, ...]
+    notes: tuple[str, ...]
+
+    @property
+    def changed_scores(self) -> tuple[ScoreChange, ...]:
+        """Scores that differ by more than rounding."""
+        return tuple(one for one in self.scores if one.changed)
+
+    @property
+    def differs(self) -> bool:
+        """Whether anything differs but measured times and the machine, which never repeat."""
+        inputs = any(change.kind != "machine" for change in self.changes)
+        return inputs or bool(self.changed_scores) or any(self.flip_counts.values()) or self._unequal
+
+    @property
+    def _unequal(self) -> bool:
+        return any("units not compared" in note for note in self.notes)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values for JSON; undefined numbers are NaN, which the store writes as null."""
+        return {
+            "first": str(self.first.path),
+            "second": str(self.second.path),
+            "differs": self.differs,
+            "changes": [vars(change) for change in self.changes],
+            "scores": [
+                {
+                    **dict(zip(("dataset", "source", "scoring", "table"), one.board, strict=True)),
+                    **{key: getattr(one, key) for key in ("detector", "metric", "captures", "before", "after")},
+                    "difference": dataclasses.asdict(one.difference),
+                    "p_adjusted": one.adjusted,
+                }
+                for one in self.scores
+            ],
+            "times": [dataclasses.asdict(one) for one in self.times],
+            "flips": {
+                "scoring": self.scoring,
+                "frames": self.compared_frames,
+                "counts": [
+                    {"detector": detector, "before": before, "after": after, "frames": count}
+                    for detector, counter in self.flip_counts.items()
+                    for (before, after), count in counter.most_common()
+                ],
+                "worst": [_flip(one) for one in self.worst],
+            },
+            "notes": list(self.notes),
+        }
+
+
+def compare(first: RunFolder, second: RunFolder, scoring: str | None = None, most: int = MOST_FLIPS) -> Comparison:
+    """Compare two runs from what they stored; nothing is run.
+
+    Parameters
+    ----------
+    first, second : RunFolder
+    scoring : str, optional
+        By which frames are compared; the first run's first by default.
+    most : int
+        Flipped frames that are listed.
+
+    Raises
+    ------
+    ConfigError
+        If the first run was not scored so.
+    StoreError
+        If something stored is missing or broken.
+    """
+    with read_safely(first.path):
+        rules = {rule.scoring: rule for rule in first.rules}
+        settings = {**first.manifest["experiment"]["intervals"], "seed": first.manifest["experiment"]["seed"]}
+    if scoring is not None and scoring not in rules:
+        raise ConfigError(f"{first.path}: was not scored by '{scoring}'.{nearest(scoring, rules)}")
+    rule = next(one for name, one in rules.items() if scoring in (None, name))
+    with read_safely(second.path):
+        different = changes(first, second)
+        units, left_out = shared(first, second)
+        scores, unjudged = score_changes(units, list(rules.values()), settings)
+        times, untimed = time_changes(first, second)
+        counts, frames, worst = flips(units, rule, most)
+    if first.rules != second.rules:
+        unjudged.insert(0, "the runs were scored by different rules; both are judged here by those of the first")
+    ended = [note for folder in (first, second) for note in _seal(folder)]
+    notes = (*ended, *left_out, *unjudged, *untimed, *first.damage, *second.damage)
+    return Comparison(
+        first=first,
+        second=second,
+        changes=tuple(different),
+        scores=tuple(scores),
+        times=tuple(times),
+        scoring=rule.scoring,
+        compared_frames=frames,
+        flip_counts=counts,
+        worst=tuple(worst),
+        notes=notes,
+    )
+
+
+def _seal(folder: RunFolder) -> Iterator[str]:
+    """What its seal says against a run; 'uwbbench verify' looks closer."""
+    if not folder.sealed:
+        yield f"{folder.path}: is not sealed: the run did not end, or an earlier version made it"
+    elif not folder.intact:
+        yield f"{folder.path}: its manifest was changed after the run ended; see 'uwbbench verify'"
+
+
+def _flip(one: Flip) -> dict[str, Any]:
+    about = {key: getattr(one.unit, key) for key in ("detector", "dataset", "capture")}
+    return about | {field.name: getattr(one, field.name) for field in dataclasses.fields(one) if field.name != "unit"}

@@ -1,0 +1,161 @@
+"""What changed in scores and times between two runs.
+
+Conventions
+-----------
+* Both runs are judged again under the rules of the first one, so that what differs is what was detected.
+* Differences are second minus first, on the same captures, with paired bootstrap intervals; p-values are adjusted after
+  Holm over the detectors of a dataset, scoring and table, for each metric.
+* Of times only the ratio to the reference is compared, and only where both used the same reference. Its interval is
+  that of two independent log-normal values, each inside its run; it does not know how much processes differ.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import defaultdict
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from uwbbench.api import registry
+from uwbbench.api.errors import ScoringError
+from uwbbench.api.metric import Metric, Outcome
+from uwbbench.measure.accuracy.scoring import ScoringRules, outcomes
+from uwbbench.measure.accuracy.stats import Difference, evaluate, holm, paired_difference
+from uwbbench.results.comparison.units import Unit
+from uwbbench.results.pareto import NORMAL_975, Speed, speed_of
+from uwbbench.run.folder.folder import RunFolder
+
+METRICS = ("f1", "precision", "recall", "mae", "p95", "false_alarms_per_minute")
+
+Board = tuple[str, str, str, str]
+"""Dataset, source, scoring and table."""
+
+
+@dataclass(frozen=True)
+class ScoreChange:
+    """One metric of one detector on one board.
+
+    Attributes
+    ----------
+    board : Board
+    detector, metric : str
+    captures : int
+    before, after : float
+    difference : Difference
+        After minus before.
+    adjusted : float
+        The p-value after Holm; NaN where there are too few groups.
+    """
+
+    board: Board
+    detector: str
+    metric: str
+    captures: int
+    before: float
+    after: float
+    difference: Difference
+    adjusted: float
+
+    @property
+    def changed(self) -> bool:
+        """Whether it differs by more than sums that were rounded otherwise; undefined is not zero."""
+        undefined = math.isnan(self.before), math.isnan(self.after)
+        if any(undefined):
+            return not all(undefined)
+        return not math.isclose(self.before, self.after, rel_tol=1e-9, abs_tol=1e-12)
+
+
+@dataclass(frozen=True)
+class TimeChange:
+    """Time ratio to the reference of one detector on one dataset.
+
+    Attributes
+    ----------
+    dataset, detector : str
+    before, after : Speed
+    factor, low, high : float
+        After over before, with the ends of a 95 % interval.
+    """
+
+    dataset: str
+    detector: str
+    before: Speed
+    after: Speed
+    factor: float
+    low: float
+    high: float
+
+
+def score_changes(
+    units: Sequence[Unit], rules: Sequence[ScoringRules], settings: Mapping[str, Any]
+) -> tuple[list[ScoreChange], list[str]]:
+    """Every metric of every board, and what could not be judged.
+
+    Parameters
+    ----------
+    units : sequence of Unit
+    rules : sequence of ScoringRules
+    settings : mapping
+        ``resamples``, ``confidence`` and ``seed`` of the intervals.
+    """
+    boards: dict[Board, dict[str, list[tuple[Outcome, Outcome]]]] = defaultdict(lambda: defaultdict(list))
+    missing: dict[str, None] = {}
+    for unit in units:
+        for rule in rules:
+            try:
+                before, after = (outcomes(found, unit.header, rule) for found in unit.found)
+            except ScoringError as error:
+                missing[f"not judged by {rule.scoring}: {error}"] = None
+                continue
+            for table in before:
+                if table in after:
+                    board = unit.dataset, unit.header.source, rule.scoring, table
+                    boards[board][unit.detector].append((before[table], after[table]))
+    found = [change for board, members in boards.items() for change in _changes(board, members, settings)]
+    return found, list(missing)
+
+
+def _changes(
+    board: Board, members: Mapping[str, list[tuple[Outcome, Outcome]]], settings: Mapping[str, Any]
+) -> Iterator[ScoreChange]:
+    for name in METRICS:
+        metric: type[Metric] = registry.load_plugin("metrics", name)
+        rows = []
+        for detector, pairs in members.items():
+            before, after = [pair[0] for pair in pairs], [pair[1] for pair in pairs]
+            difference = paired_difference(metric, after, before, **settings)
+            rows.append((detector, len(pairs), evaluate(metric, before), evaluate(metric, after), difference))
+        adjusted = holm([row[-1].p_value for row in rows]).tolist()
+        for (detector, captures, old, new, difference), p_value in zip(rows, adjusted, strict=True):
+            if not (math.isnan(old) and math.isnan(new)):
+                yield ScoreChange(board, detector, name, captures, old, new, difference, p_value)
+
+
+def time_changes(first: RunFolder, second: RunFolder) -> tuple[list[TimeChange], list[str]]:
+    """Time ratios that both runs measured, and what could not be compared."""
+    sides = [_speeds(folder) for folder in (first, second)]
+    identities = [folder.manifest.get("reference") for folder in (first, second)]
+    found, missing = [], dict[str, None]()
+    for (dataset, detector), before in sides[0].items():
+        after = sides[1].get((dataset, detector))
+        if after is None:
+            continue
+        if before.reference != after.reference or identities[0] != identities[1]:
+            missing["times not compared: the references differ"] = None
+            continue
+        middle = math.log(after.ratio / before.ratio)
+        reach = NORMAL_975 * math.hypot(before.spread, after.spread)
+        reach = math.nan if math.isnan(before.low) or math.isnan(after.low) else reach
+        ends = [math.exp(value) for value in (middle, middle - reach, middle + reach)]
+        found.append(TimeChange(dataset, detector, before, after, *ends))
+    return found, list(missing)
+
+
+def _speeds(folder: RunFolder) -> dict[tuple[str, str], Speed]:
+    timed: dict[tuple[str, str], list[Any]] = defaultdict(list)
+    for entry in folder.entries():
+        if (entry.kind, entry.status) == ("latency", "done"):
+            timed[entry.dataset, entry.detector].append(entry)
+    known = {key: speed_of(entries) for key, entries in timed.items()}
+    return {key: speed for key, speed in known.items() if speed is not None}

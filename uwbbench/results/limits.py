@@ -1,0 +1,285 @@
+"""Detectors against physical limits, from a run over the ``limits`` dataset.
+
+Conventions
+-----------
+* Truth and signal-to-noise ratio of these test signals are exact. SNR is the power of an echo's crest over that of the
+  complex noise of one tap, behind a receiver matched to the pulse.
+* An echo is *found* if a detection of its frame lies within :data:`GATE_M` of its range; the error is that of the
+  nearest such detection. Errors are therefore conditional on being found: read them with the probability beside.
+* Accuracy, detection against SNR and false alarms are taken in the *clear* span :data:`CLEAR_M`, away from the direct
+  path and from the last taps.
+* Detectors that report every cell over a threshold, and not one detection an echo, are asked for false alarms only.
+* Frames are independent by construction, so proportions have exact binomial intervals.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from uwbbench.api.arrays import BoolArray, FloatArray, IntArray
+from uwbbench.api.capture import CaptureHeader
+from uwbbench.api.detections import Detections
+from uwbbench.api.geometry import SPEED_OF_LIGHT_M_S
+from uwbbench.measure.accuracy.stats import clopper_pearson
+from uwbbench.run.folder.folder import RunFolder
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+DATASET = "limits"
+SYMBOL_S, ROLL_OFF = 2.0e-9, 0.5
+"""Root-raised-cosine pulse of the dataset (IEEE 802.15.4 HRP reference)."""
+GATE_M = 0.20
+CLEAR_M = (2.0, 5.5)
+RANGE_EDGES_M = (0.2, 0.6, 1.0, 2.0, 4.0, 6.0)
+BLIND_STEP_M, BLIND_UP_TO_M = 0.10, 2.0
+
+
+def rms_bandwidth_hz(symbol_s: float = SYMBOL_S, roll_off: float = ROLL_OFF) -> float:
+    """Root-mean-square bandwidth of a root-raised-cosine pulse.
+
+    ``(1/T) sqrt(1/12 + b^2 (1/4 - 2/pi^2))``, the second moment of the raised-cosine power spectrum: 154.25 MHz for
+    T = 2 ns and roll-off b = 0.5, against 144.3 MHz of a rectangular 500 MHz spectrum.
+
+    Parameters
+    ----------
+    symbol_s, roll_off : float
+
+    Examples
+    --------
+    >>> round(rms_bandwidth_hz() / 1e6, 2), round(rms_bandwidth_hz(roll_off=0.0) / 1e6, 1)
+    (154.25, 144.3)
+    """
+    return math.sqrt(1 / 12 + roll_off**2 * (1 / 4 - 2 / math.pi**2)) / symbol_s
+
+
+def cramer_rao_range_m(snr_db: float) -> float:
+    """Smallest standard deviation of an unbiased range estimate from one echo of unknown amplitude and phase.
+
+    ``c / 2 * 1 / (2 pi B sqrt(2 SNR))`` with the root-mean-square bandwidth B (Kay, Fundamentals of Statistical Signal
+    Processing: Estimation Theory, 1993, section 3.11, for a complex envelope).
+
+    Parameters
+    ----------
+    snr_db : float
+        Power of the echo's crest over that of the complex noise, behind the matched filter.
+
+    Returns
+    -------
+    float
+        In metres of range, half the path.
+
+    Examples
+    --------
+    >>> [round(100 * cramer_rao_range_m(snr_db), 2) for snr_db in (10, 20, 30)]
+    [3.46, 1.09, 0.35]
+    """
+    return SPEED_OF_LIGHT_M_S / (4 * math.pi * rms_bandwidth_hz() * math.sqrt(2 * 10 ** (snr_db / 10)))
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One detector on one test signal.
+
+    Attributes
+    ----------
+    detector, scene : str
+    snr_db : float
+    separation_ns : float or None
+    header : CaptureHeader
+    found : Detections
+    """
+
+    detector: str
+    scene: str
+    snr_db: float
+    separation_ns: float | None
+    header: CaptureHeader
+    found: Detections
+
+    @cached_property
+    def range_m(self) -> FloatArray:
+        """True range (frames, echoes)."""
+        truth = self.header.truth
+        objects = truth.objects if truth is not None else ()
+        columns = [np.linalg.norm(thing.outline_m[:, 0], axis=-1) for thing in objects]
+        return np.stack(columns, axis=1) if columns else np.empty((len(self.header), 0))
+
+    @cached_property
+    def error_m(self) -> FloatArray:
+        """Error (frames, echoes) of the nearest detection; NaN where the frame has none."""
+        frame, range_m = self.found.frame, self.found.range_m
+        error_m = np.full(self.range_m.shape, np.nan)
+        for echo in range(self.range_m.shape[1]):
+            off_m = range_m - self.range_m[frame, echo]
+            order = np.argsort(-np.abs(off_m), kind="stable")  # the nearest is written last
+            error_m[frame[order], echo] = off_m[order]
+        return error_m
+
+    def proportion(self, hits: BoolArray, among: BoolArray) -> dict[str, Any]:
+        """Share of the frames ``among`` that are ``hits``, with its interval."""
+        return _proportion(int(np.sum(hits & among)), int(np.sum(among)))
+
+
+class Limits:
+    """Numbers of a run over the ``limits`` dataset.
+
+    Parameters
+    ----------
+    folder : RunFolder
+
+    Raises
+    ------
+    StoreError
+        If something stored is missing or broken.
+    """
+
+    def __init__(self, folder: RunFolder) -> None:
+        self.folder = folder
+        self._configs = {config["name"]: config for config in folder.manifest["experiment"]["detectors"]}
+
+    @cached_property
+    def trials(self) -> list[Trial]:
+        """Every detector on every test signal, in the order of the experiment."""
+        used = self.folder.manifest["experiment"]["datasets"]
+        params = {one["label"]: one["params"] for one in used if one["use"] == DATASET}
+        entries = [
+            e for e in self.folder.entries() if (e.kind, e.status) == ("accuracy", "done") and e.dataset in params
+        ]
+        detectors, labels = list(self._configs), list(params)
+        entries.sort(key=lambda entry: (detectors.index(entry.detector), labels.index(entry.dataset)))
+        return [
+            Trial(
+                detector=entry.detector,
+                scene=params[entry.dataset]["scene"],
+                snr_db=float(params[entry.dataset]["snr_db"]),
+                separation_ns=params[entry.dataset].get("separation_ns"),
+                header=self.folder.header(entry.capture_id),
+                found=self.folder.detections(entry.unit),
+            )
+            for entry in entries
+        ]
+
+    @cached_property
+    def accuracy(self) -> pd.DataFrame:
+        """Range error of each detector against the Cramer-Rao bound, in the clear span."""
+        return self._table("echo", _accuracy)
+
+    @cached_property
+    def detection(self) -> pd.DataFrame:
+        """Probability of detection by range and signal-to-noise ratio."""
+        return self._table("echo", _detection)
+
+    @cached_property
+    def blind_zone(self) -> pd.DataFrame:
+        """Radius around the receiver inside which echoes are found less than half as often as in the clear span."""
+        return self._table("echo", _blind_zone)
+
+    @cached_property
+    def resolution(self) -> pd.DataFrame:
+        """How often two equal echoes are told apart."""
+        return self._table("pair", _resolution)
+
+    @cached_property
+    def false_alarms(self) -> pd.DataFrame:
+        """False alarms of a cell of noise, measured and, for CFAR detectors, requested."""
+        return self._table("noise", self._false_alarms)
+
+    def _table(self, scene: str, rows: Callable[[Trial], Iterator[dict[str, Any]]]) -> pd.DataFrame:
+        import pandas as pd
+
+        chosen = [trial for trial in self.trials if trial.scene == scene]
+        if scene != "noise":
+            chosen = [trial for trial in chosen if not self._reports_cells(trial.detector)]
+        return pd.DataFrame([row for trial in chosen for row in rows(trial)])
+
+    def _reports_cells(self, detector: str) -> bool:
+        """Whether it reports every cell over a threshold: several for an echo, which says nothing about accuracy."""
+        return any(step["params"].get("cells") == "all" for step in self._configs[detector]["pipeline"])
+
+    def _false_alarms(self, trial: Trial) -> Iterator[dict[str, Any]]:
+        radar = trial.header.radar
+        cell_m = SPEED_OF_LIGHT_M_S * radar.sample_interval_s / 2
+        cells = round(len(trial.found.processed) * (CLEAR_M[1] - CLEAR_M[0]) / cell_m)
+        alarms = int(np.sum(_clear(trial.found.range_m)))
+        requested, condition = self._requested(trial.detector, radar.channel)
+        facts = {"requested": requested, "condition": condition, "alarms": alarms}
+        yield {"detector": trial.detector, **_proportion(alarms, cells), **facts}
+
+    def _requested(self, detector: str, channel: int | None) -> tuple[float, str]:
+        """False-alarm rate that a detector asks of its CFAR stage, and what for; NaN where it has none."""
+        for step in self._configs[detector]["pipeline"]:
+            rate = step["params"].get("false_alarm_rate")
+            if rate is not None:
+                by_channel = rate.get("by_channel", {}) if isinstance(rate, dict) else {}
+                value = by_channel.get(str(channel), by_channel.get("other", math.nan)) if by_channel else rate
+                return float(
+                    value
+                ), f"{step['params'].get('cells', 'maxima')}, {step['params'].get('noise', 'independent')}"
+        return math.nan, ""
+
+    def to_dict(self) -> dict[str, Any]:
+        """All tables as plain rows; empty where the run has no test signals."""
+        names = ("accuracy", "detection", "blind_zone", "resolution", "false_alarms")
+        return {name: getattr(self, name).to_dict("records") for name in names} if self.trials else {}
+
+
+def _proportion(hits: int, trials: int) -> dict[str, Any]:
+    low, high = clopper_pearson(hits, trials)
+    return {"share": hits / trials if trials else math.nan, "low": low, "high": high, "n": trials}
+
+
+def _clear(range_m: FloatArray) -> BoolArray:
+    return np.asarray((range_m >= CLEAR_M[0]) & (range_m <= CLEAR_M[1]))
+
+
+def _accuracy(trial: Trial) -> Iterator[dict[str, Any]]:
+    clear = _clear(trial.range_m[:, 0])
+    error_m = trial.error_m[:, 0]
+    found = np.abs(error_m) <= GATE_M
+    kept = error_m[clear & found]
+    bound_m = cramer_rao_range_m(trial.snr_db)
+    rmse_m = float(np.sqrt(np.mean(kept**2))) if len(kept) else math.nan
+    bias_m = float(np.mean(kept)) if len(kept) else math.nan
+    facts = {"rmse_m": rmse_m, "bias_m": bias_m, "bound_m": bound_m, "ratio": rmse_m / bound_m}
+    yield {"detector": trial.detector, "snr_db": trial.snr_db, **trial.proportion(found, clear), **facts}
+
+
+def _detection(trial: Trial) -> Iterator[dict[str, Any]]:
+    range_m = trial.range_m[:, 0]
+    found = np.abs(trial.error_m[:, 0]) <= GATE_M
+    for near, far in itertools.pairwise(RANGE_EDGES_M):
+        inside = (range_m >= near) & (range_m < far)
+        about = {"detector": trial.detector, "snr_db": trial.snr_db, "near_m": near, "far_m": far}
+        yield {**about, **trial.proportion(found, inside)}
+
+
+def _blind_zone(trial: Trial) -> Iterator[dict[str, Any]]:
+    """Far edge of the last step of range, counted outwards, with less than half the detections of the clear span."""
+    steps = round(BLIND_UP_TO_M / BLIND_STEP_M)
+    step: IntArray = np.floor(trial.range_m[:, 0] / BLIND_STEP_M).astype(np.int64)
+    near = step < steps
+    found = np.abs(trial.error_m[:, 0]) <= GATE_M
+    echoes = np.bincount(step[near], minlength=steps)
+    hits = np.bincount(step[near & found], minlength=steps)
+    usual = float(np.mean(found[_clear(trial.range_m[:, 0])]))
+    missed = np.flatnonzero(2 * hits < usual * echoes)
+    radius_m = float(missed[-1] + 1) * BLIND_STEP_M if len(missed) else 0.0
+    defined = usual > 0 and radius_m < BLIND_UP_TO_M
+    yield {"detector": trial.detector, "snr_db": trial.snr_db, "radius_m": radius_m if defined else math.nan}
+
+
+def _resolution(trial: Trial) -> Iterator[dict[str, Any]]:
+    """Both echoes of a pair are found, each nearer than half their distance, so by two detections."""
+    apart_m = (trial.range_m[:, 1] - trial.range_m[:, 0])[:, None]
+    resolved = np.asarray((np.abs(trial.error_m) < np.minimum(apart_m / 2, GATE_M)).all(axis=1))
+    clear = np.asarray(_clear(trial.range_m).all(axis=1))
+    about = {"detector": trial.detector, "snr_db": trial.snr_db, "separation_ns": trial.separation_ns}
+    yield {**about, **trial.proportion(resolved, clear)}

@@ -1,0 +1,176 @@
+"""Speed against error: which detectors no other one beats in both, and how sure that is.
+
+Conventions
+-----------
+* Speed is the time a frame relative to the reference detector of the run, measured in alternating blocks; it is what
+  travels between machines. Over several timed captures it is the geometric mean.
+* A detector is on the front if no other one is at least as fast and at least as good, and better in one of them.
+* The probability of being on the front is the share of bootstrap draws in which it is. A draw takes captures (or
+  blocks of a second, where captures are few) anew, the same for all detectors, and a time ratio for each detector
+  from a log-normal distribution through its stored interval, as the run keeps the ratio and its interval only.
+* Detectors are compared on the captures that all of them were scored on. One that finds nothing is not drawn.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from uwbbench.api.arrays import BoolArray, FloatArray
+from uwbbench.api.metric import Metric
+from uwbbench.measure.accuracy.stats import Estimate, bootstrap, paired_draws
+from uwbbench.results.results import Scored
+from uwbbench.run.folder.journal import Entry
+
+NORMAL_975 = 1.959964
+"""The 97.5 % quantile of the normal distribution: half the width of a 95 % interval."""
+
+
+@dataclass(frozen=True)
+class Speed:
+    """Time a frame relative to the reference.
+
+    Attributes
+    ----------
+    reference : str
+    ratio, low, high : float
+        With the ends of a 95 % interval; NaN where a block comparison was too short for one.
+    captures : int
+        Timed captures behind it.
+    deadline : float
+        The radar's frame period, in times of the reference's median time a frame on this machine.
+    p50_us : float
+        Median time a frame on this machine.
+    """
+
+    reference: str
+    ratio: float
+    low: float
+    high: float
+    captures: int
+    deadline: float
+    p50_us: float
+
+    @property
+    def spread(self) -> float:
+        """Standard deviation of the logarithm; 0 where no interval is known."""
+        return 0.0 if math.isnan(self.low) else math.log(self.high / self.low) / (2 * NORMAL_975)
+
+
+@dataclass(frozen=True)
+class Point:
+    """One detector among others.
+
+    Attributes
+    ----------
+    detector : str
+    speed : Speed
+    error : Estimate
+        The metric, on the captures that all detectors share.
+    on_front : bool
+        By the values themselves.
+    probability : float
+        Of being on the front; NaN where there are too few groups to draw from.
+    """
+
+    detector: str
+    speed: Speed
+    error: Estimate
+    on_front: bool
+    probability: float
+
+
+def speed_of(timed: Sequence[Entry]) -> Speed | None:
+    """Speed of a detector from its latency entries of one dataset; None where it was never compared.
+
+    Several captures are put together by the mean of the logarithms, their intervals as those of independent values.
+    """
+    compared = [entry.facts for entry in timed if entry.facts.get("ratio_to_reference")]
+    if not compared:
+        return None
+    ratios = [facts["ratio_to_reference"] for facts in compared]
+    middle = float(np.mean([math.log(one["ratio"]) for one in ratios]))
+    known = all(one["low"] is not None for one in ratios)
+    half = [math.log(one["high"] / one["low"]) / 2 for one in ratios] if known else [math.nan]
+    reach = float(np.sqrt(np.sum(np.square(half)))) / len(half)
+    deadlines = [
+        facts["deadline_us"] / facts["p50_us"] * one["ratio"] for facts, one in zip(compared, ratios, strict=True)
+    ]
+    return Speed(
+        reference=ratios[0]["reference"],
+        ratio=math.exp(middle),
+        low=math.exp(middle - reach),
+        high=math.exp(middle + reach),
+        captures=len(compared),
+        deadline=float(np.median(deadlines)),
+        p50_us=float(np.median([facts["p50_us"] for facts in compared])),
+    )
+
+
+def points(
+    members: Mapping[str, Sequence[Scored]],
+    speeds: Mapping[str, Speed],
+    metric: type[Metric],
+    settings: Mapping[str, Any],
+) -> list[Point]:
+    """Points of a chart, the fastest first.
+
+    Parameters
+    ----------
+    members : mapping of str to sequence of Scored
+        What each detector did on one board.
+    speeds : mapping of str to Speed
+    metric : type of Metric
+    settings : mapping
+        ``resamples``, ``confidence`` and ``seed`` of the intervals.
+    """
+    timed = {name: scored for name, scored in members.items() if name in speeds}
+    shared = set.intersection(*(set(_by_capture(scored)) for scored in timed.values())) if timed else set()
+    series, estimates = {}, {}
+    for name, scored in timed.items():
+        outcomes = [one.outcome for capture, one in sorted(_by_capture(scored).items()) if capture in shared]
+        estimate = bootstrap(metric, outcomes, **settings)
+        if outcomes and any(outcome.tp.any() for outcome in outcomes) and not math.isnan(estimate.value):
+            series[name], estimates[name] = outcomes, estimate
+    if not series:
+        return []
+    names = list(series)
+    sign = -1.0 if metric.better == "higher" else 1.0
+    logs = np.array([math.log(speeds[name].ratio) for name in names])
+    best = front(logs[None], np.array([[sign * estimates[name].value for name in names]]))[0]
+    resamples, seed = settings["resamples"], settings["seed"]
+    errors = sign * paired_draws(metric, list(series.values()), resamples=resamples, seed=seed)
+    chance = np.full(len(names), math.nan)
+    if len(errors):
+        spread = np.array([speeds[name].spread for name in names])
+        drawn = np.random.default_rng([seed, 1]).normal(logs, spread, size=errors.shape)
+        chance = front(drawn, errors).mean(axis=0)
+    found = [
+        Point(name, speeds[name], estimates[name], bool(on), float(p))
+        for name, on, p in zip(names, best, chance, strict=True)
+    ]
+    return sorted(found, key=lambda point: point.speed.ratio)
+
+
+def front(cost: FloatArray, error: FloatArray) -> BoolArray:
+    """Which columns (draws, detectors) no other column beats in both cost and error; NaN is always beaten.
+
+    Examples
+    --------
+    >>> front(np.array([[1.0, 2.0, 3.0]]), np.array([[0.3, 0.1, 0.2]])).tolist()
+    [[True, True, False]]
+    """
+    on = ~(np.isnan(cost) | np.isnan(error))
+    for column in range(cost.shape[1]):
+        c, e = cost[:, column, None], error[:, column, None]
+        beaten = (c <= cost) & (e <= error) & ((c < cost) | (e < error))
+        on &= ~beaten
+    return np.asarray(on)
+
+
+def _by_capture(scored: Sequence[Scored]) -> dict[str, Scored]:
+    return {one.capture: one for one in scored}

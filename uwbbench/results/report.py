@@ -1,0 +1,300 @@
+"""What one run says: a leaderboard, the two tables of arXiv 2512.01018, times, and all that did not work.
+
+Conventions
+-----------
+* Captures are pooled before a number is made of them: the value is that of all their frames together.
+* Captures of different datasets, and measured and simulated ones, are never pooled; every row says which it is of.
+* Where the truth is not exhaustive an unmatched detection proves nothing: recall stands beside the recall of as many
+  random ranges (``chance_recall``), and precision and F1 are undefined.
+* Times are those of the machine that ran the experiment, and hold nowhere else.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections import defaultdict
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from uwbbench.api import registry
+from uwbbench.api.errors import StoreError
+from uwbbench.measure.accuracy.stats import Estimate, bootstrap
+from uwbbench.results import published
+from uwbbench.results.limits import Limits
+from uwbbench.results.results import Scored, scored
+from uwbbench.results.slices import estimates_of
+from uwbbench.run.folder.folder import RunFolder
+from uwbbench.run.folder.journal import Entry
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+STANDARD = ("precision", "recall", "f1", "mae", "p90", "p95", "sd", "false_alarms_per_minute")
+"""Metrics of every leaderboard, by registered name."""
+
+
+@contextmanager
+def read_safely(path: Path) -> Iterator[None]:
+    """Turn what goes wrong over values that no run writes into one message about the folder.
+
+    Inside, numerical libraries use one thread: products of small matrices only get slower by more.
+
+    Raises
+    ------
+    StoreError
+        Where a stored value is missing, or of another kind than a run of this version writes.
+    """
+    from threadpoolctl import threadpool_limits
+
+    try:
+        with threadpool_limits(1):
+            yield
+    except (KeyError, TypeError, ValueError, AttributeError, IndexError) as error:
+        what = f"no {error}" if isinstance(error, KeyError) else f"{type(error).__name__}: {error}"
+        raise StoreError(
+            f"{path}: does not hold what a run of this version writes ({what}): it was edited, cut short, or made by "
+            "another version"
+        ) from error
+
+
+class Report:
+    """All tables of one run.
+
+    Parameters
+    ----------
+    folder : RunFolder
+
+    Raises
+    ------
+    StoreError
+        If something stored is missing or broken.
+    """
+
+    def __init__(self, folder: RunFolder) -> None:
+        self.folder = folder
+        self.experiment: dict[str, Any] = folder.manifest["experiment"]
+        self.entries: list[Entry] = folder.entries()
+        self.detectors: list[str] = [config["name"] for config in self.experiment["detectors"]]
+        names = dict.fromkeys([*STANDARD, *self.experiment["metrics"]])
+        self.metrics = {name: registry.load_plugin("metrics", name) for name in names}
+
+    @cached_property
+    def scored(self) -> list[Scored]:
+        """Every unit that could be scored."""
+        return scored(self.folder)
+
+    @cached_property
+    def estimates(self) -> list[tuple[dict[str, Any], dict[str, Estimate]]]:
+        """Leaderboard rows: what each is of, and its estimates by metric."""
+        groups: dict[tuple[str, ...], list[Scored]] = defaultdict(list)
+        for one in self.scored:
+            groups[one.dataset, one.source, one.scoring, one.table, one.detector].append(one)
+        settings = {**self.experiment["intervals"], "seed": self.experiment["seed"]}
+        rows = []
+        for members in groups.values():
+            found = estimates_of(self.metrics, [one.outcome for one in members], settings)
+            rows.append((self._about(members), found))
+        rows.sort(key=lambda row: self._rank(*row))
+        return rows
+
+    def _about(self, members: Sequence[Scored]) -> dict[str, Any]:
+        first = members[0]
+        about = {key: getattr(first, key) for key in ("dataset", "source", "scoring", "table", "detector")}
+        truths = np.array([one.outcome.tp.sum() + one.outcome.fn.sum() for one in members], float)
+        chance = np.array([math.nan if (c := one.numbers["chance_recall"]) is None else c for one in members], float)
+        return about | {
+            "captures": len(members),
+            "frames": sum(one.frames for one in members),
+            "invalid": sum(one.frames - one.processed for one in members),
+            "unprocessed": sum(int(one.numbers["unprocessed"]) for one in members),
+            "scored_frames": sum(len(one.outcome.group) for one in members),
+            "exhaustive": all(one.outcome.exhaustive for one in members),
+            "chance_recall": float((chance * truths).sum() / truths.sum()) if truths.sum() else math.nan,
+            **self._times(first.detector, first.dataset),
+        }
+
+    def _times(self, detector: str, dataset: str) -> dict[str, Any]:
+        """Times of a detector: medians over the captures that were timed."""
+        timed = [e.facts for e in self._of_kind("latency") if (e.detector, e.dataset) == (detector, dataset)]
+        return {key: _median(facts[key] for facts in timed) for key in ("p50_us", "p99_us")}
+
+    def _of_kind(self, kind: str) -> list[Entry]:
+        return [entry for entry in self.entries if entry.kind == kind and entry.status == "done"]
+
+    def _rank(self, about: dict[str, Any], found: dict[str, Estimate]) -> tuple[Any, ...]:
+        """Best F1 first; best recall where F1 is undefined. Undefined ones last, in the order of the experiment."""
+        best = found["f1" if about["exhaustive"] else "recall"].value
+        table = (about["dataset"], about["source"], about["scoring"], about["table"])
+        return *table, math.inf if math.isnan(best) else -best, self.detectors.index(about["detector"])
+
+    @cached_property
+    def leaderboard(self) -> pd.DataFrame:
+        """One row for each dataset, scoring, table and detector, best first, with intervals and counts."""
+        import pandas as pd
+
+        rows = []
+        for about, found in self.estimates:
+            row = dict(about)
+            for name, estimate in found.items():
+                row |= {name: estimate.value, f"{name}_low": estimate.low, f"{name}_high": estimate.high}
+                row[f"{name}_n"] = estimate.n
+            row["groups"] = found["recall"].groups
+            rows.append(row)
+        return pd.DataFrame(rows)
+
+    @cached_property
+    def paper_tables(self) -> pd.DataFrame:
+        """The two tables of arXiv 2512.01018, for every detector and scoring: rows channel and material.
+
+        ``table`` tells them apart: ``filtering`` (error of the range) and ``mapping`` (distance to the outline).
+        """
+        import pandas as pd
+
+        groups: dict[tuple[Any, ...], list[Scored]] = defaultdict(list)
+        for one in self.scored:
+            order = one.table, one.scoring, self.detectors.index(one.detector), one.dataset, one.channel or 0
+            groups[*order, one.material, one.source].append(one)
+        settings = {**self.experiment["intervals"], "seed": self.experiment["seed"]}
+        rows = []
+        for _, members in sorted(groups.items(), key=lambda item: item[0]):
+            first = members[0]
+            keys = ("table", "scoring", "detector", "dataset", "channel", "material", "source")
+            outcomes = [one.outcome for one in members]
+            row = {key: getattr(first, key) for key in keys} | {"captures": len(members)}
+            row["frames"] = sum(len(outcome.group) for outcome in outcomes)
+            for name in STANDARD[:7]:
+                estimate = bootstrap(self.metrics[name], outcomes, **settings)
+                row |= {name: estimate.value, f"{name}_low": estimate.low, f"{name}_high": estimate.high}
+                row[f"{name}_n"] = estimate.n
+            rows.append(row)
+        return pd.DataFrame(rows)
+
+    @cached_property
+    def repeats_the_paper(self) -> bool:
+        """Whether the run covers every row of the paper's tables."""
+        table = self.paper_tables
+        rows = set() if table.empty else set(zip(table["channel"], table["material"], strict=True))
+        return rows >= set(published.ROWS)
+
+    @cached_property
+    def chains(self) -> pd.DataFrame:
+        """Detections left behind each step, one row for each detector, dataset and step, captures added up."""
+        import pandas as pd
+
+        counts: dict[tuple[str, str, str], int] = defaultdict(int)
+        for entry in self._of_kind("accuracy"):
+            for step, count in entry.facts["chain"].items():
+                counts[entry.detector, entry.dataset, step] += count
+            clustered = self.folder.detections(entry.unit)["cluster"] >= 0
+            if "dbscan" in entry.facts["chain"]:
+                counts[entry.detector, entry.dataset, "in clusters"] += int(clustered.sum())
+        rows = [(*key, count) for key, count in counts.items()]
+        datasets = [used["label"] for used in self.experiment["datasets"]]
+        rows.sort(key=lambda row: (self.detectors.index(row[0]), datasets.index(row[1])))
+        return pd.DataFrame(rows, columns=["detector", "dataset", "step", "count"])
+
+    @cached_property
+    def limits(self) -> Limits:
+        """Comparison with physical limits; empty unless the run has test signals."""
+        return Limits(self.folder)
+
+    @cached_property
+    def latency(self) -> pd.DataFrame:
+        """One row for each detector and capture that was timed."""
+        import pandas as pd
+
+        rows = []
+        for entry in self._of_kind("latency"):
+            facts = dict(entry.facts)
+            ratio, clustering = facts.pop("ratio_to_reference") or {}, facts.pop("clustering") or {}
+            for name in ("plain", "paced", "quality", "machine"):  # only in the JSON; older runs have none
+                facts.pop(name, None)
+            facts["notes"] = "; ".join(facts["notes"])
+            about = {"detector": entry.detector, "dataset": entry.dataset, "capture": entry.capture}
+            extra = {"ratio_low": ratio.get("low"), "ratio_high": ratio.get("high"), "ratio": ratio.get("ratio")}
+            extra |= {"reference": ratio.get("reference"), "clustering_p50_us": clustering.get("p50_us")}
+            extra |= {"total_ratio": ratio.get("total_ratio"), "missed_share_high": facts.get("missed_share_high")}
+            rows.append({**about, **facts, **extra})
+        return pd.DataFrame(rows)
+
+    @cached_property
+    def captures(self) -> list[dict[str, Any]]:
+        """What was compared on; the description of a simulated scene says which terms were kept, and at what cost."""
+        rows: dict[str, dict[str, Any]] = {}
+        for entry in self._of_kind("accuracy"):
+            if entry.capture_id not in rows:
+                header = self.folder.header(entry.capture_id)
+                about = {key: getattr(header, key) for key in ("source", "license", "citation", "description")}
+                rows[entry.capture_id] = {
+                    "dataset": entry.dataset,
+                    "capture": entry.capture,
+                    "frames": len(header),
+                } | about
+        return sorted(rows.values(), key=lambda row: (row["dataset"], row["capture"]))
+
+    @cached_property
+    def stability(self) -> list[dict[str, Any]]:
+        """How each detector stood the hard cases, in the order of the experiment."""
+        facts = {entry.detector: entry.facts for entry in self._of_kind("stability")}
+        return [{"detector": name} | facts[name] for name in self.detectors if name in facts]
+
+    @cached_property
+    def failures(self) -> list[Entry]:
+        """Units, and whole datasets, that failed."""
+        return [entry for entry in self.entries if entry.status == "failed"]
+
+    @cached_property
+    def unscored(self) -> list[tuple[Entry, str, str]]:
+        """Units that ran but could not be scored: entry, scoring, reason."""
+        table = self.folder.scores()
+        rows = table[table["status"] == "unscored"].to_dict("records") if "status" in table else []
+        by_name = {(e.detector, e.dataset, e.capture): e for e in self._of_kind("accuracy")}
+        keyed = [(by_name.get((row["detector"], row["dataset"], row["capture"])), row) for row in rows]
+        return [(entry, row["scoring"], row["reason"]) for entry, row in keyed if entry is not None]
+
+    @cached_property
+    def notes(self) -> list[str]:
+        """What detectors and the journal want the reader to know, each once with how often."""
+        counts: dict[str, int] = defaultdict(int)
+        for entry in self._of_kind("accuracy"):
+            for note in entry.facts["notes"]:
+                counts[f"{entry.detector}: {note}"] += 1
+        said = [f"{note} ({count} captures)" if count > 1 else note for note, count in counts.items()]
+        return said + self.folder.damage
+
+    def to_dict(self) -> dict[str, Any]:
+        """Everything as plain values, for JSON; undefined numbers are NaN, which the store writes as null."""
+        rows = []
+        for about, found in self.estimates:
+            rows.append(about | {name: dataclasses.asdict(estimate) for name, estimate in found.items()})
+        keys = ("kind", "detector", "dataset", "capture", "reason")
+        return {
+            "run": str(self.folder.path),
+            "experiment": self.experiment["name"],
+            "leaderboard": rows,
+            "paper_tables": self.paper_tables.to_dict("records"),
+            "chains": self.chains.to_dict("records"),
+            "limits": self.limits.to_dict(),
+            "latency": [{**facts_of(entry), **entry.facts} for entry in self._of_kind("latency")],
+            "captures": self.captures,
+            "stability": self.stability,
+            "failures": [{key: getattr(entry, key) for key in keys} for entry in self.failures],
+            "unscored": [{**facts_of(entry), "scoring": s, "reason": reason} for entry, s, reason in self.unscored],
+            "notes": self.notes,
+        }
+
+
+def facts_of(entry: Entry) -> dict[str, str]:
+    """Names of what an entry is about."""
+    return {"detector": entry.detector, "dataset": entry.dataset, "capture": entry.capture}
+
+
+def _median(values: Iterable[float | None]) -> float:
+    known = [value for value in values if value is not None]
+    return float(np.median(known)) if known else math.nan

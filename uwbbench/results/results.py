@@ -1,0 +1,113 @@
+"""What a run folder says about each detector and capture, judged again from the stored detections."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from uwbbench.api.arrays import FloatArray
+from uwbbench.api.capture import CaptureHeader
+from uwbbench.api.errors import ScoringError, StoreError
+from uwbbench.api.metric import Outcome
+from uwbbench.measure.accuracy.judge import Scene, judge
+from uwbbench.measure.accuracy.scoring import ScoringRules, tables_of
+from uwbbench.run.folder.folder import RunFolder
+
+
+@dataclass(frozen=True)
+class Scored:
+    """One detector on one capture in one scoring and table.
+
+    Attributes
+    ----------
+    detector, dataset, capture, scoring, table : str
+    source : {"measured", "simulated"}
+    channel : int or None
+    material : str
+        Materials of the obstacles of the capture.
+    frames, processed : int
+        Frames of the capture, and those that the detector looked at; the others were invalid.
+    numbers : mapping
+        The stored score row.
+    outcome : Outcome
+    range_m : (scored frames,) array
+        True range of the nearest visible obstacle; NaN where there is none.
+    """
+
+    detector: str
+    dataset: str
+    capture: str
+    scoring: str
+    table: str
+    source: str
+    channel: int | None
+    material: str
+    frames: int
+    processed: int
+    numbers: Mapping[str, Any]
+    outcome: Outcome
+    range_m: FloatArray
+
+
+def scored(folder: RunFolder) -> list[Scored]:
+    """Every unit of a run that could be scored, under the rules of the stored scores.
+
+    Raises
+    ------
+    StoreError
+        If the run was killed before its scores were written.
+    """
+    table = folder.scores()
+    if "scoring" not in table:
+        return []
+    keys = ["detector", "dataset", "capture", "scoring", "table"]
+    rows = {tuple(row[key] for key in keys): row for row in table.to_dict("records") if row["status"] == "scored"}
+    return list(_scored(folder, rows, folder.rules))
+
+
+def _scored(folder: RunFolder, rows: Mapping[Any, Any], rules: Sequence[ScoringRules]) -> Iterator[Scored]:
+    headers: dict[str, CaptureHeader] = {}
+    for entry in folder.entries():
+        if entry.kind != "accuracy" or entry.status != "done":
+            continue
+        if entry.capture_id not in headers:
+            headers[entry.capture_id] = folder.header(entry.capture_id)
+        found, header = folder.detections(entry.unit), headers[entry.capture_id]
+        try:
+            scene = Scene.of(found, header)
+        except ScoringError:  # its reason is in the stored scores
+            continue
+        for rule in rules:
+            try:
+                tables = {name: judge(found, scene, rule, name).outcome for name in tables_of(found)}
+            except ScoringError:
+                continue
+            for name, outcome in tables.items():
+                key = entry.detector, entry.dataset, entry.capture, rule.scoring, name
+                if key not in rows:
+                    raise StoreError(f"{folder.path}: its scores are older than its journal; continue it with --resume")
+                yield Scored(
+                    detector=entry.detector,
+                    dataset=entry.dataset,
+                    capture=entry.capture,
+                    scoring=rule.scoring,
+                    table=name,
+                    source=header.source,
+                    channel=header.radar.channel,
+                    material=" + ".join(entry.facts["materials"]) or "none",
+                    frames=len(header),
+                    processed=len(found.processed),
+                    numbers=rows[key],
+                    outcome=outcome,
+                    range_m=_nearest_m(scene, rule),
+                )
+
+
+def _nearest_m(scene: Scene, rule: ScoringRules) -> FloatArray:
+    """Range (scored frames,) of the nearest visible obstacle."""
+    range_m = np.where(scene.visible(rule.region), scene.sight.range_m, np.inf)
+    nearest_m = range_m.min(axis=1, initial=np.inf)[scene.scored]
+    return np.where(np.isinf(nearest_m), np.nan, nearest_m)

@@ -1,0 +1,182 @@
+"""The leaderboard cut by channel, material and range, each cut with its own intervals.
+
+Conventions
+-----------
+* A frame belongs to the range bin of its nearest visible obstacle; frames with nothing in view are in no bin, and only
+  in the row of all ranges.
+* Bins have one width in a run, so that datasets can be read side by side.
+* Channels and materials are those of whole captures. Cuts by channel, material and range at once have no intervals:
+  there are many of them, and few frames in each.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import defaultdict
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from uwbbench.api.arrays import FloatArray
+from uwbbench.api.metric import Metric, Outcome
+from uwbbench.measure.accuracy.metrics.error import MeanAbsoluteError, matched_only
+from uwbbench.measure.accuracy.stats import Estimate, bootstrap, subset
+from uwbbench.results.results import Scored
+
+WIDTHS_M = (0.25, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
+MOST_BINS = 8
+"""The narrowest width is taken that needs no more bins than this."""
+
+ALL = ""
+"""Value of a cut that takes everything."""
+
+Board = tuple[str, str, str, str]
+"""Dataset, source, scoring and table: numbers of different boards are never put together."""
+
+
+@dataclass(frozen=True)
+class Slice:
+    """One detector on part of a board.
+
+    Attributes
+    ----------
+    board : Board
+    channel, material, span : str
+        The cut; :data:`ALL` where it takes everything.
+    detector : str
+    captures, frames : int
+        Captures that have scored frames in this cut, and those frames.
+    estimates : mapping of str to Estimate
+    """
+
+    board: Board
+    channel: str
+    material: str
+    span: str
+    detector: str
+    captures: int
+    frames: int
+    estimates: Mapping[str, Estimate]
+
+
+def range_edges_m(scored: Sequence[Scored]) -> FloatArray:
+    """Edges (bins + 1,) of the range bins; none where nothing is ever visible."""
+    known = [one.range_m[np.isfinite(one.range_m)] for one in scored]
+    low = min((float(part.min()) for part in known if len(part)), default=math.nan)
+    high = max((float(part.max()) for part in known if len(part)), default=math.nan)
+    if math.isnan(low):
+        return np.empty(0)
+    for width in WIDTHS_M:
+        first, last = math.floor(low / width), math.floor(high / width) + 1
+        if last - first <= MOST_BINS:
+            break
+    return np.asarray(np.arange(first, last + 1) * width, np.float64)
+
+
+def span_name(near_m: float, far_m: float) -> str:
+    """Name of a range bin.
+
+    Examples
+    --------
+    >>> span_name(0.5, 1.0)
+    '0.5 to 1 m'
+    """
+    return f"{near_m:g} to {far_m:g} m"
+
+
+def slices(
+    scored: Sequence[Scored],
+    metrics: Mapping[str, type[Metric]],
+    edges_m: FloatArray,
+    settings: Mapping[str, Any],
+    known: Mapping[tuple[Board, str], Mapping[str, Estimate]],
+) -> Iterator[Slice]:
+    """Every cut of every board, for every detector.
+
+    Parameters
+    ----------
+    scored : sequence of Scored
+    metrics : mapping of str to type of Metric
+        By name; ``matched_mae``, the mean absolute error of true positives, is added.
+    edges_m : (bins + 1,) array
+    settings : mapping
+        ``resamples``, ``confidence`` and ``seed`` of the intervals.
+    known : mapping
+        Estimates of whole boards, by board and detector, which are there already.
+    """
+    boards: dict[Board, list[Scored]] = defaultdict(list)
+    for one in scored:
+        boards[one.dataset, one.source, one.scoring, one.table].append(one)
+    for board, members in boards.items():
+        parts = {id(one): _spans(one, edges_m) for one in members}
+        for (channel, material), (same, chosen) in cuts(members).items():
+            if same != (channel, material):
+                continue
+            groups: dict[tuple[str, str], list[Outcome]] = defaultdict(list)
+            for one in chosen:
+                groups[one.detector, ALL].append(one.outcome)
+                for span, outcome in parts[id(one)].items():
+                    groups[one.detector, span].append(outcome)
+            for (detector, span), outcomes in groups.items():
+                threefold = ALL not in (channel, material, span)
+                if (channel, material, span) == (ALL, ALL, ALL):
+                    estimates = known[board, detector]
+                else:
+                    estimates = estimates_of(metrics, outcomes, {**settings, "resamples": 0} if threefold else settings)
+                frames = sum(len(outcome.group) for outcome in outcomes)
+                yield Slice(board, channel, material, span, detector, len(outcomes), frames, estimates)
+
+
+def estimates_of(
+    metrics: Mapping[str, type[Metric]], outcomes: Sequence[Outcome], settings: Mapping[str, Any]
+) -> dict[str, Estimate]:
+    """Estimates of all metrics, and of the mean absolute error of true positives alone."""
+    found = {name: bootstrap(metric, outcomes, **settings) for name, metric in metrics.items()}
+    found["matched_mae"] = bootstrap(MeanAbsoluteError, [matched_only(one) for one in outcomes], **settings)
+    return found
+
+
+def cuts(members: Sequence[Scored]) -> dict[tuple[str, str], tuple[tuple[str, str], list[Scored]]]:
+    """Cuts of a board by channel and material that hold captures.
+
+    Returns
+    -------
+    dict
+        By channel and material: the widest cut that holds the same captures, and what was scored on them.
+    """
+    channels = sorted({channel_name(one.channel) for one in members})
+    materials = sorted({one.material for one in members})
+    widest: dict[frozenset[int], tuple[str, str]] = {}
+    found = {}
+    for channel in [ALL, *channels]:
+        for material in [ALL, *materials]:
+            chosen = [
+                one
+                for one in members
+                if channel in (ALL, channel_name(one.channel)) and material in (ALL, one.material)
+            ]
+            if chosen:
+                same = widest.setdefault(frozenset(map(id, chosen)), (channel, material))
+                found[channel, material] = same, chosen
+    return found
+
+
+def channel_name(channel: int | None) -> str:
+    """Name of a channel."""
+    return "none" if channel is None else str(channel)
+
+
+def _spans(one: Scored, edges_m: FloatArray) -> dict[str, Outcome]:
+    """Outcome in each range bin in which there are frames; none where a run has one bin."""
+    bins = len(edges_m) - 1
+    if bins < 2:
+        return {}
+    number = np.where(np.isfinite(one.range_m), np.digitize(one.range_m, edges_m) - 1, -1)
+    inside = {place: number == place for place in range(bins)}
+    return {
+        span_name(edges_m[place], edges_m[place + 1]): subset(one.outcome, rows)
+        for place, rows in inside.items()
+        if rows.any()
+    }

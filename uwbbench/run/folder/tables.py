@@ -1,0 +1,112 @@
+"""Detections and capture headers as Parquet tables and JSON."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from uwbbench.api.arrays import IntArray
+from uwbbench.api.capture import CaptureHeader
+from uwbbench.api.detections import Detections
+from uwbbench.api.radar import Radar
+from uwbbench.api.truth import Obstacle, Trajectory, Truth
+from uwbbench.run.folder.files import read_json, read_parquet, write_json, write_parquet
+
+
+def as_spans(frames: IntArray) -> list[list[int]]:
+    """Sorted frame indices as ``[first, last + 1]`` spans.
+
+    Examples
+    --------
+    >>> as_spans(np.array([0, 1, 2, 5]))
+    [[0, 3], [5, 6]]
+    """
+    if not len(frames):
+        return []
+    breaks = np.flatnonzero(np.diff(frames) != 1) + 1
+    return [[int(run[0]), int(run[-1]) + 1] for run in np.split(frames, breaks)]
+
+
+def from_spans(spans: Iterable[Sequence[int]]) -> IntArray:
+    """Frame indices of spans."""
+    runs = [np.arange(start, stop, dtype=np.int64) for start, stop in spans]
+    return np.concatenate(runs) if runs else np.empty(0, np.int64)
+
+
+def write_detections(path: Path, found: Detections) -> None:
+    """Store detections with the frames that were processed, the notes and the chain."""
+    import pyarrow as pa
+
+    facts = {"processed": as_spans(found.processed), "notes": found.notes, "chain": list(found.chain.items())}
+    write_parquet(path, pa.table(dict(found.columns)), facts)
+
+
+def read_detections(path: Path, candidates: Path | None = None) -> Detections:
+    """Stored detections; with their candidates where those are given."""
+    table, facts = read_parquet(path)
+    columns: dict[str, Any] = {name: table.column(name).to_numpy() for name in table.column_names}
+    return Detections(
+        **columns,
+        processed=from_spans(facts["processed"]),
+        notes=facts["notes"],
+        chain=dict(facts["chain"]),
+        candidates=None if candidates is None else read_detections(candidates),
+    )
+
+
+def write_header(stem: Path, header: CaptureHeader, sha256: str) -> None:
+    """Store all of a capture but its samples as ``stem.json`` and, per frame, ``stem.parquet``."""
+    import pyarrow as pa
+
+    track = header.trajectory
+    columns: dict[str, Any] = {"timestamp_s": track.timestamp_s, "yaw_rad": track.yaw_rad}
+    columns |= {f"{axis}_m": track.position_m[:, index] for index, axis in enumerate("xyz")}
+    objects = []
+    for index, thing in enumerate(header.truth.objects if header.truth else ()):
+        label: dict[str, Any] = {"name": thing.name, "material": thing.material, "structure": thing.structure}
+        if thing.moves:
+            label["moves"] = list(thing.outline_m.shape[1:])
+            flat = np.ascontiguousarray(thing.outline_m, np.float64).reshape(len(track), -1)
+            columns |= {f"outline_{index}_{place}": flat[:, place] for place in range(flat.shape[1])}
+        else:
+            label["outline_m"] = thing.outline_m
+        objects.append(label)
+    about = {name: getattr(header, name) for name in ("name", "source", "license", "citation", "description")}
+    truth = None if header.truth is None else {"exhaustive": header.truth.exhaustive, "objects": objects}
+    write_parquet(stem.with_suffix(".parquet"), pa.table(columns), {})
+    write_json(stem.with_suffix(".json"), {**about, "sha256": sha256, "radar": header.radar.to_dict(), "truth": truth})
+
+
+def read_header(stem: Path) -> CaptureHeader:
+    """Stored capture header."""
+    data = read_json(stem.with_suffix(".json"))
+    table, _ = read_parquet(stem.with_suffix(".parquet"))
+
+    def column(name: str) -> np.ndarray[Any, np.dtype[np.float64]]:
+        return np.asarray(table.column(name).to_numpy(), dtype=np.float64)
+
+    radar: dict[str, Any] = {
+        key: tuple(value) if isinstance(value, list) else value for key, value in data["radar"].items()
+    }
+    truth = None
+    if data["truth"] is not None:
+        objects = []
+        for index, label in enumerate(data["truth"]["objects"]):
+            if "moves" in label:
+                vertices, axes = label["moves"]
+                flat = [column(f"outline_{index}_{place}") for place in range(vertices * axes)]
+                outline = np.stack(flat, axis=1).reshape(-1, vertices, axes)
+            else:
+                outline = np.asarray(label["outline_m"], dtype=np.float64)
+            objects.append(Obstacle(label["name"], label["material"], outline, label["structure"]))
+        truth = Truth(tuple(objects), data["truth"]["exhaustive"])
+    position_m = np.stack([column(f"{axis}_m") for axis in "xyz"], axis=1)
+    return CaptureHeader(
+        **{name: data[name] for name in ("name", "source", "license", "citation", "description")},
+        radar=Radar(**radar),
+        trajectory=Trajectory(column("timestamp_s"), position_m, column("yaw_rad")),
+        truth=truth,
+    )

@@ -1,6 +1,0 @@
-"""New plugin packages, written from templates, with tests that pass."""
-
-from uwbbench.scaffold.naming import PluginName
-from uwbbench.scaffold.package import KINDS, Kind, write_package
-
-__all__ = ["KINDS", "Kind", "PluginName", "write_package"]

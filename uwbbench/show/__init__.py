@@ -1,0 +1,1 @@
+"""What people see: text, charts, pages, figures for print, and notebooks."""

@@ -1,0 +1,108 @@
+"""Charts as Vega-Lite specifications: the page draws them, and pictures for print are made of the same ones.
+
+Conventions
+-----------
+* A specification holds its data and its title, and nothing about colours of paper and ink: those are the theme's.
+* Every chart of simulated captures says so in its title.
+* A detector keeps its colour, marker and dash through a whole report.
+* Numbers are in the units that people read: cm, us, per cent.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+from uwbbench.show.charts.theme import DASHES, SERIES, SHAPES
+
+Spec = dict[str, Any]
+
+SCHEMA = "https://vega.github.io/schema/vega-lite/v6.json"
+HEIGHT = 400
+
+
+def chart(title: str, subtitle: str, layers: list[Spec], **more: Any) -> Spec:
+    """Chart of several layers, as wide as where it stands."""
+    head = {"text": title, "subtitle": subtitle} if subtitle else {"text": title}
+    return {
+        "$schema": SCHEMA,
+        "title": {**head, "anchor": "start", "frame": "bounds"},
+        "width": "container",
+        "height": HEIGHT,
+        "autosize": {"type": "fit", "contains": "padding"},
+        "layer": layers,
+        **more,
+    }
+
+
+class Series:
+    """How the detectors of a chart look: each as in every other chart of the report.
+
+    Parameters
+    ----------
+    names : mapping of str to str
+        Labels of all detectors, in the order of the experiment.
+    shown : collection of str
+        Labels of those in this chart.
+    """
+
+    def __init__(self, names: Mapping[str, str], shown: Iterable[str]) -> None:
+        present = set(shown)
+        self._places = {label: place for place, label in enumerate(names.values()) if label in present}
+
+    @property
+    def detectors(self) -> list[str]:
+        """Labels in the order of the experiment."""
+        return list(self._places)
+
+    def encoding(self, legend: Spec | None, *channels: str) -> Spec:
+        """Encoding of a detector by colour, and by ``shape`` or ``strokeDash`` where asked."""
+        looks: dict[str, Sequence[Any]] = {"color": SERIES, "shape": SHAPES, "strokeDash": DASHES}
+        return {
+            channel: {
+                "field": "detector",
+                "type": "nominal",
+                "title": None,
+                "legend": legend,
+                "scale": {
+                    "domain": self.detectors,
+                    "range": [looks[channel][place % len(looks[channel])] for place in self._places.values()],
+                },
+            }
+            for channel in ("color", *channels)
+        }
+
+
+LEGEND: Spec = {"orient": "bottom", "direction": "horizontal", "columns": 4, "labelLimit": 220, "title": None}
+LINES: Spec = {**LEGEND, "symbolType": "stroke", "symbolSize": 500}
+
+
+def axis(field: str, title: str, **more: Any) -> Spec:
+    """Encoding of a number by a place."""
+    return {"field": field, "type": "quantitative", "title": title, **more}
+
+
+def limits(values: Sequence[float], *, share: float = 0.06) -> list[float]:
+    """Limits of a linear axis around values."""
+    known = [value for value in values if math.isfinite(value)]
+    low, high = min(known, default=0.0), max(known, default=1.0)
+    room = share * (high - low) or max(abs(high) * share, 1e-3)
+    return [low - room, high + room]
+
+
+def deadline(at: float, text: str, x: Spec) -> Spec:
+    """Layer that marks the radar's frame period."""
+    return {
+        "data": {"values": [{"at": at, "text": text}] if math.isfinite(at) else []},
+        "layer": [
+            {
+                "mark": {"type": "rule", "strokeDash": [5, 4], "style": "deadline"},
+                "encoding": {"x": axis("at", "", **x)},
+            },
+            {
+                "mark": {"type": "text", "align": "right", "dx": -5, "baseline": "top", "style": "note"},
+                "encoding": {"x": axis("at", "", **x), "y": {"value": 4}, "text": {"field": "text"}},
+            },
+        ],
+    }

@@ -1,0 +1,114 @@
+"""Errors: by range, and as a whole distribution."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+from uwbbench.results.curves import ErrorCurve, axis_limit_m
+from uwbbench.results.slices import Slice
+from uwbbench.show.charts.chart import LEGEND, LINES, Series, Spec, axis, chart
+from uwbbench.show.text.quantity import Quantity
+from uwbbench.show.text.sheet import number
+
+SHARES = (0, 0.25, 0.5, 0.75, 0.9, 0.95, 1)
+SMALLEST_CM = 0.1
+"""Smallest error on a logarithmic axis."""
+
+
+def by_range(title: str, found: Sequence[Slice], spans: Sequence[str], names: Mapping[str, str], by: Quantity) -> Spec:
+    """A metric against range, a point with its interval for each detector and bin."""
+    rows: list[Spec] = []
+    for one in found:
+        estimate = one.estimates[by.name]
+        if not math.isnan(estimate.value):
+            value, low, high = (by.scaled(v) for v in (estimate.value, estimate.low, estimate.high))
+            rows.append(
+                {
+                    "detector": names[one.detector],
+                    "span": one.span,
+                    "value": value,
+                    "low": value if math.isnan(low) else low,
+                    "high": value if math.isnan(high) else high,
+                    "told": by.told(estimate),
+                }
+            )
+    series = Series(names, [row["detector"] for row in rows])
+    look = series.encoding(LEGEND, "shape")
+    place = {
+        "x": {
+            "field": "span",
+            "type": "ordinal",
+            "title": "True range of the nearest visible obstacle",
+            "scale": {"domain": list(spans), "paddingInner": 0.3},
+            "axis": {"labelAngle": 0, "labelOverlap": "greedy", "grid": False},
+        },
+        "xOffset": {"field": "detector", "type": "nominal", "scale": {"domain": series.detectors}},
+    }
+    y = {"scale": {"zero": by.better != "higher"}}
+    up = axis("value", by.axis, **y)
+    tooltip = [
+        {"field": "detector", "title": "Detector"},
+        {"field": "span", "title": "Range"},
+        {"field": "told", "title": by.title},
+    ]
+    layers: list[Spec] = [
+        {
+            "mark": {"type": "line", "strokeWidth": 1.2, "opacity": 0.5},
+            "encoding": {**place, "y": up, "color": look["color"]},
+        },
+        {
+            "mark": {"type": "rule", "strokeWidth": 1.4},
+            "encoding": {**place, "y": axis("low", by.axis, **y), "y2": {"field": "high"}, "color": look["color"]},
+        },
+        {
+            "mark": {"type": "point", "filled": True, "size": 48, "opacity": 1},
+            "encoding": {**place, "y": up, **look, "tooltip": tooltip},
+        },
+    ]
+    subtitle = "Bars: bootstrap intervals; a bin with too few groups has none."
+    return chart(title, subtitle, layers, data={"values": rows})
+
+
+def error_cdf(title: str, curves: Mapping[str, ErrorCurve], names: Mapping[str, str]) -> Spec:
+    """Distribution of the absolute errors, one curve for each detector, with its percentiles."""
+    far_m, logarithmic = axis_limit_m(list(curves.values()))
+    least = SMALLEST_CM if logarithmic else 0.0
+    rows: list[Spec] = []
+    points: list[Spec] = []
+    for detector, curve in curves.items():
+        known = [("median", curve.p50_m, 0.5), ("P90", curve.p90_m, 0.9), ("P95", curve.p95_m, 0.95)]
+        told = ", ".join(f"{what} {number(value, 1, 100)}" for what, value, _ in known)
+        label = names[detector]
+        rows += [
+            {"detector": label, "error": max(100 * error_m, least), "share": share}
+            for error_m, share in zip(curve.error_m.tolist(), curve.share.tolist(), strict=True)
+        ]
+        points += [
+            {"detector": label, "error": 100 * value, "share": at, "told": f"{told} cm, n = {curve.n} detections"}
+            for _, value, at in known
+            if not math.isnan(value)
+        ]
+    series = Series(names, [row["detector"] for row in rows])
+    look = series.encoding(LINES, "strokeDash")
+    scale = {"type": "log" if logarithmic else "linear", "domain": [least, 100 * far_m], "nice": False}
+    x = axis("error", "Absolute error (cm)", scale=scale, axis={"format": "~g", "tickCount": 8})
+    y = axis(
+        "share",
+        "Share of detections",
+        scale={"domain": [0, 1]},
+        axis={"values": list(SHARES), "format": ".2~f", "labelOverlap": False},
+    )
+    tooltip = [{"field": "detector", "title": "Detector"}, {"field": "told", "title": "Absolute error"}]
+    layers: list[Spec] = [
+        {
+            "mark": {"type": "line", "strokeWidth": 1.8, "clip": True},
+            "encoding": {"x": x, "y": y, **look},
+        },
+        {
+            "data": {"values": points},
+            "mark": {"type": "point", "filled": True, "size": 52, "clip": True, "opacity": 1},
+            "encoding": {"x": x, "y": y, "color": look["color"], "tooltip": tooltip},
+        },
+    ]
+    return chart(title, "All retained detections. Points: median, P90 and P95.", layers, data={"values": rows})

@@ -1,0 +1,156 @@
+"""Speed against error, with intervals on both axes, the front, and the radar's frame period."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from uwbbench.results.pareto import Point
+from uwbbench.show.charts.chart import HEIGHT, Series, Spec, axis, chart, deadline, limits
+from uwbbench.show.text.quantity import Quantity
+from uwbbench.show.text.sheet import number
+
+PLOT_PX = (520.0, HEIGHT - 110.0)
+"""About the size of the plot in print, for which labels are placed."""
+
+SIDES = ((12, -11), (12, 13), (-12, -11), (-12, 13), (12, -26), (12, 28), (-12, -26), (-12, 28), (12, -41), (12, 43))
+"""Places of a label beside its point, in pixels right and down, the best first."""
+
+
+def speed_against_error(title: str, found: Sequence[Point], names: Mapping[str, str], quantity: Quantity) -> Spec:
+    """Chart of all detectors that were both timed and scored.
+
+    Parameters
+    ----------
+    title : str
+    found : sequence of Point
+        At least one.
+    names : mapping of str to str
+        Labels of detectors.
+    quantity : Quantity
+        The metric.
+    """
+    rows = [_row(point, names, quantity) for point in found]
+    frame_period = float(np.median([point.speed.deadline for point in found]))
+    ends = [row[side] for row in rows for side in ("left", "right")]
+    reach = [min(*ends, frame_period) / 1.25, max(*ends, frame_period) * 1.25]
+    span = limits([row[side] for row in rows for side in ("low", "high")], share=0.12)
+    span = [max(span[0], 0.0), min(span[1], 1.01) if quantity.better == "higher" else span[1]]
+    _place_labels(rows, reach, span)
+
+    x = {"scale": {"type": "log", "domain": reach, "nice": False}, "axis": {"format": "~g"}}
+    y = {"scale": {"domain": span, "zero": False, "nice": False}}
+    reference = found[0].speed.reference
+    across = axis("ratio", f"Time a frame, in times of {names.get(reference, reference)} (ratio, log)", **x)
+    up = axis("value", quantity.axis, **y)
+    series = Series(names, [row["detector"] for row in rows])
+    colour, marker = series.encoding(None), series.encoding(None, "shape")
+    tooltip = [
+        {"field": "detector", "title": "Detector"},
+        {"field": "error", "title": quantity.title},
+        {"field": "time", "title": "Time ratio"},
+        {"field": "p50", "title": "Median time a frame"},
+        {"field": "chance", "title": "On the front, probability"},
+    ]
+    point = {"type": "point", "size": 95, "strokeWidth": 2, "opacity": 1}
+    layers: list[Spec] = [
+        deadline(frame_period, "frame period of the radar", x),
+        {
+            "data": {"values": sorted((row for row in rows if row["front"]), key=lambda row: row["ratio"])},
+            "mark": {"type": "line", "interpolate": "step-after", "style": "front"},
+            "encoding": {"x": across, "y": up},
+        },
+        {
+            "mark": {"type": "rule", "strokeWidth": 1.5},
+            "encoding": {"x": axis("left", "", **x), "x2": {"field": "right"}, "y": up, **colour},
+        },
+        {
+            "mark": {"type": "rule", "strokeWidth": 1.5},
+            "encoding": {"x": across, "y": axis("low", "", **y), "y2": {"field": "high"}, **colour},
+        },
+        {"mark": {**point, "filled": False}, "encoding": {"x": across, "y": up, **marker, "tooltip": tooltip}},
+        {
+            "transform": [{"filter": "datum.front"}],
+            "mark": {**point, "filled": True},
+            "encoding": {"x": across, "y": up, **marker, "tooltip": tooltip},
+        },
+        {
+            "mark": {
+                "type": "text",
+                "style": "label",
+                "dx": {"expr": "datum.dx"},
+                "dy": {"expr": "datum.dy"},
+                "align": {"expr": "datum.dx < 0 ? 'right' : 'left'"},
+                "baseline": "middle",
+            },
+            "encoding": {"x": across, "y": up, "text": {"field": "label"}},
+        },
+    ]
+    better = "up" if quantity.better == "higher" else "down"
+    subtitle = (
+        f"Better: left and {better}. Filled: on the front by its values. P: bootstrap probability of being on it."
+    )
+    return chart(title, subtitle, layers, data={"values": rows})
+
+
+def _row(point: Point, names: Mapping[str, str], quantity: Quantity) -> Spec:
+    value, low, high = (quantity.scaled(v) for v in (point.error.value, point.error.low, point.error.high))
+    speed = point.speed
+    timed = not math.isnan(speed.low)
+    ends = f"[{number(speed.low, 3)}, {number(speed.high, 3)}]" if timed else "(no interval)"
+    plural = "capture" if speed.captures == 1 else "captures"
+    return {
+        "detector": names[point.detector],
+        "ratio": speed.ratio,
+        "left": speed.low if timed else speed.ratio,
+        "right": speed.high if timed else speed.ratio,
+        "value": value,
+        "low": value if math.isnan(low) else low,
+        "high": value if math.isnan(high) else high,
+        "front": point.on_front,
+        "label": f"{names[point.detector]}, P {_share(point.probability)}",
+        "error": quantity.told(point.error),
+        "time": f"{number(speed.ratio, 3)} {ends}, {speed.captures} timed {plural}",
+        "p50": f"{number(speed.p50_us, 0)} us on this machine",
+        "chance": _share(point.probability),
+    }
+
+
+def _share(value: float) -> str:
+    """Probability from draws as a text, never rounded to certainty."""
+    if math.isnan(value):
+        return "n/a"
+    return ">0.99" if value > 0.99 else "<0.01" if value < 0.01 else f"{value:.2f}"
+
+
+def _place_labels(rows: list[Spec], reach: Sequence[float], span: Sequence[float]) -> None:
+    """Give each label the first side on which it hides no point, bar or label, as far as there is one."""
+    width, height = PLOT_PX
+
+    def across(ratio: float) -> float:
+        return width * math.log(ratio / reach[0]) / math.log(reach[1] / reach[0])
+
+    def up(value: float) -> float:
+        return height * (value - span[0]) / (span[1] - span[0])
+
+    taken = []
+    for row in rows:
+        x, y = across(row["ratio"]), up(row["value"])
+        taken.append((x - 8, x + 8, y - 8, y + 8))
+        taken.append((x - 1, x + 1, up(row["low"]), up(row["high"])))
+    for row in rows:
+        x, y, wide = across(row["ratio"]), up(row["value"]), 6.2 * len(row["label"])
+        fewest = None
+        for right, down in SIDES:
+            left = x + right if right > 0 else x + right - wide
+            box = (left, left + wide, y - down - 7, y - down + 7)
+            hits = sum(box[0] < b[1] and b[0] < box[1] and box[2] < b[3] and b[2] < box[3] for b in taken)
+            outside = (box[0] < 0) + (box[1] > width) + (box[2] < 0) + (box[3] > height)
+            hits += 3 * outside  # a label that hides something can still be read, one that is cut cannot
+            if fewest is None or hits < fewest[0]:
+                fewest = hits, right, down, box
+        if fewest is not None:
+            row |= {"dx": fewest[1], "dy": fewest[2]}
+            taken.append(fewest[3])

@@ -1,0 +1,128 @@
+"""The kinds of picture by name, and what each is drawn from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from uwbbench.api.errors import ConfigError, nearest
+from uwbbench.measure.accuracy.scoring import ScoringRules
+from uwbbench.run.folder import RunFolder
+from uwbbench.show.figures.cdf import draw_cdf
+from uwbbench.show.figures.chain import draw_pipeline
+from uwbbench.show.figures.cir import draw_cir
+from uwbbench.show.figures.environment import draw_map
+from uwbbench.show.figures.properties import draw_properties
+from uwbbench.show.figures.radargram import draw_radargram
+from uwbbench.show.figures.source import Found, from_capture, from_run, one_of, rules_of_run
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from uwbbench.api.capture import Capture
+    from uwbbench.detect.pipeline import Pipeline
+
+KINDS = {
+    "cir": "one frame: response, first path, noise floor, peaks with prominence, width and fate",
+    "radargram": "a capture over time and range, with truth and detections",
+    "properties": "peak prominence and width against distance, by material",
+    "pipeline": "from all peaks through the filters to clusters, from above",
+    "cdf": "distribution of the absolute errors",
+    "map": "clustered points, true outlines and robot path",
+}
+
+
+@dataclass(frozen=True)
+class Choices:
+    """What may be chosen about a picture; None where nobody did.
+
+    Attributes
+    ----------
+    frame : int or None
+        For ``cir``.
+    scoring, gate_m : str, float or None
+        For ``cdf``; the gate for ``properties`` too.
+    table : {"filtering", "mapping"} or None
+        For ``cdf``.
+    """
+
+    frame: int | None = None
+    scoring: str | None = None
+    gate_m: float | None = None
+    table: str | None = None
+
+
+_USED_BY = {"frame": ("cir",), "scoring": ("cdf",), "table": ("cdf",), "gate_m": ("cdf", "properties")}
+
+
+def check_kind(kind: str, choices: Choices) -> None:
+    """Refuse a kind that does not exist, and a choice that would change nothing.
+
+    Raises
+    ------
+    ConfigError
+        With the nearest kind, or the kinds that the choice is for.
+    """
+    if kind not in KINDS:
+        raise ConfigError(f"no kind of plot '{kind}'.{nearest(kind, KINDS)}")
+    for name, kinds in _USED_BY.items():
+        if getattr(choices, name) is not None and kind not in kinds:
+            option = name.replace("_", "-")
+            raise ConfigError(f"--{option} is for the kind {' and '.join(kinds)}; it changes nothing in '{kind}'")
+
+
+def draw_capture(kind: str, capture: Capture, detector: Pipeline | None, choices: Choices) -> Figure:
+    """Draw a capture, with a detector that runs on it now.
+
+    Raises
+    ------
+    ConfigError
+        If the kind or a choice is wrong, or the kind needs a detector.
+    """
+    check_kind(kind, choices)
+    if kind == "radargram":
+        return draw_radargram(capture, detector)
+    if detector is None:
+        raise ConfigError(f"the kind '{kind}' shows what a detector does: give one with --detector")
+    if kind == "cir":
+        return draw_cir(capture, detector, choices.frame)
+    gate_m = 0.20 if choices.gate_m is None else choices.gate_m
+    # By name only: an unknown scoring is refused by the rules themselves.
+    rules = ScoringRules(choices.scoring or "frame", gate_m)  # type: ignore[arg-type]
+    return _draw_found(kind, [from_capture(capture, detector)], rules, choices, capture.name)
+
+
+def draw_run(
+    kind: str,
+    folder: RunFolder,
+    choices: Choices,
+    detector: str | None = None,
+    capture: str | None = None,
+    dataset: str | None = None,
+) -> Figure:
+    """Draw what a run folder holds; nothing is run.
+
+    Raises
+    ------
+    ConfigError
+        If the kind or a choice is wrong, or the kind shows samples, which a run folder does not hold.
+    """
+    check_kind(kind, choices)
+    if kind in ("cir", "radargram"):
+        raise ConfigError(f"{folder.path}: a run folder holds no samples; plot '{kind}' from the capture file")
+    rules = rules_of_run(folder, choices.scoring)
+    if choices.gate_m is not None:
+        rules = ScoringRules(rules.scoring, choices.gate_m, rules.region, rules.strongest)
+    return _draw_found(kind, from_run(folder, detector, capture, dataset), rules, choices, str(folder.path))
+
+
+def _draw_found(kind: str, founds: list[Found], rules: ScoringRules, choices: Choices, where: str) -> Figure:
+    if kind == "cdf":
+        return draw_cdf(founds, rules, choices.table or "filtering")
+    if kind == "properties":
+        detectors = list(dict.fromkeys(found.detector for found in founds))
+        if len(detectors) > 1:
+            raise ConfigError(f"{where}: choose one with --detector: {', '.join(detectors)}")
+        return draw_properties(founds, rules.gate_m)
+    found = one_of(founds, where)
+    return draw_map(found) if kind == "map" else draw_pipeline(found)

@@ -1,0 +1,75 @@
+"""The world from above: robot path, true outlines, points."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from uwbbench.api.capture import CaptureHeader
+from uwbbench.api.detections import Detections
+from uwbbench.api.errors import ConfigError
+from uwbbench.show.figures import style
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+MARGIN_M = 0.3
+
+
+def draw_scene(axes: Axes, header: CaptureHeader) -> tuple[list[Any], list[str]]:
+    """Draw the path of the robot with its start, and the outlines; handles and labels for a legend."""
+    from matplotlib.patches import Polygon
+
+    path = header.trajectory.position_m
+    handles: list[Any] = [
+        axes.plot(path[:, 0], path[:, 1], color=style.BLACK, ls="--", lw=0.9, zorder=2)[0],
+        axes.plot(path[:1, 0], path[:1, 1], ">", color=style.BLACK, ms=4, zorder=3, ls="none")[0],
+    ]
+    labels = ["robot path", "start"]
+    looks = {False: ("true outline", style.BLACK, 1.2), True: ("structure", style.GREY, 0.6)}
+    for thing in header.truth.objects if header.truth is not None else ():
+        label, colour, width = looks[thing.structure]
+        outline = thing.outline_m[..., :2]
+        if thing.moves:  # an outline for each frame would cover the picture: its middle's path says where it went
+            middle = outline.mean(axis=1)
+            handle: Any = axes.plot(middle[:, 0], middle[:, 1], color=style.GREEN, lw=0.9, ls=":")[0]
+            label = "path of a moving object"
+        elif len(outline) == 1:
+            handle = axes.plot(*outline.T, "*", color=colour, ms=7, mfc="none", ls="none", zorder=5)[0]
+            label = "true place"
+        else:
+            handle = axes.add_patch(Polygon(outline, closed=True, fill=False, ec=colour, lw=width, zorder=5))
+        if label not in labels:
+            handles.append(handle)
+            labels.append(label)
+    axes.set_aspect("equal")
+    return handles, labels
+
+
+def limits(header: CaptureHeader, found: Detections) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Span in x and in y that holds path, outlines and points."""
+    points = [header.trajectory.position_m[:, :2], np.stack([found["x_m"], found["y_m"]], axis=1)]
+    points += [thing.outline_m[..., :2].reshape(-1, 2) for thing in (header.truth.objects if header.truth else ())]
+    every = np.concatenate(points)
+    every = every[np.isfinite(every).all(axis=1)]
+    low, high = every.min(axis=0) - MARGIN_M, every.max(axis=0) + MARGIN_M
+    return (float(low[0]), float(high[0])), (float(low[1]), float(high[1]))
+
+
+def check_located(found: Detections, header: CaptureHeader, detector: str) -> None:
+    """Refuse detections without a place in the world.
+
+    Raises
+    ------
+    ConfigError
+        If they have none: the detector lacks the stage ``position``, or the capture the two antennas.
+    """
+    if not len(header):
+        raise ConfigError(f"capture '{header.name}' has no frames")
+    if "x_m" not in found:
+        sts = "" if header.radar.has_sts else "; the capture has no STS responses, from which an azimuth would come"
+        raise ConfigError(
+            f"detector '{detector}' gives no positions on capture '{header.name}'{sts}. "
+            "Kinds that need none: cir, radargram, properties, cdf"
+        )

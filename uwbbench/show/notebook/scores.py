@@ -1,0 +1,74 @@
+"""Scores in a notebook: every number with its count and its interval."""
+
+from __future__ import annotations
+
+import math
+
+from uwbbench.api.metric import Outcome
+from uwbbench.measure.accuracy.metrics.detection import F1, FalseAlarmsPerMinute, Precision, Recall
+from uwbbench.measure.accuracy.metrics.error import (
+    Bias,
+    MeanAbsoluteError,
+    Percentile90,
+    Percentile95,
+    StandardDeviation,
+)
+from uwbbench.measure.accuracy.scoring import ScoreBlock, Scores
+from uwbbench.measure.accuracy.stats import MINIMUM_GROUPS, Estimate, bootstrap
+from uwbbench.show.notebook import elements
+from uwbbench.show.text.quantity import Quantity
+from uwbbench.show.text.wording import TABLES
+
+METRICS = {
+    "precision": Precision,
+    "recall": Recall,
+    "f1": F1,
+    "mae": MeanAbsoluteError,
+    "p90": Percentile90,
+    "p95": Percentile95,
+    "sd": StandardDeviation,
+    "bias": Bias,
+    "false_alarms_per_minute": FalseAlarmsPerMinute,
+}
+
+
+def scores(shown: Scores) -> str:
+    """HTML of scores: each table's metrics with n and a 95 % interval over blocks of a second, and the counts."""
+    rules = shown.rules
+    parts = []
+    for name, title in TABLES.items():
+        block = shown[name]
+        if block is not None:
+            parts += [f"<div>{elements.text(title)}</div>", _table(shown.outcomes[name]), _counts(block)]
+    return elements.frame("scores", f"{rules.scoring}, gate {100 * rules.gate_m:g} cm", *parts)
+
+
+def _table(outcome: Outcome) -> str:
+    estimates = {name: bootstrap(metric, [outcome]) for name, metric in METRICS.items()}
+    rows = [_row(Quantity.of(name, METRICS[name]), estimate) for name, estimate in estimates.items()]
+    groups = next(iter(estimates.values())).groups
+    few = f"{groups} blocks of a second: too few (below {MINIMUM_GROUPS}) for intervals"
+    enough = (
+        f"intervals: 95 %, bootstrap over {groups} blocks of a second of this one capture; other captures may differ"
+    )
+    note = enough if groups >= MINIMUM_GROUPS else few
+    return elements.table(("metric", "value", "interval", "n"), rows, numbers=True) + elements.notes([note])
+
+
+def _row(quantity: Quantity, estimate: Estimate) -> tuple[str, str, str, str]:
+    def number(value: float) -> str:
+        return f"{quantity.scaled(value):.{quantity.digits}f}"
+
+    if math.isnan(estimate.value):
+        return quantity.axis, "n/a", "", f"{estimate.n} {quantity.samples}"
+    held = "n/a" if math.isnan(estimate.low) else f"[{number(estimate.low)}, {number(estimate.high)}]"
+    return quantity.axis, number(estimate.value), held, f"{estimate.n} {quantity.samples}"
+
+
+def _counts(block: ScoreBlock) -> str:
+    told = [f"{block.tp} true, {block.fp} false, {block.fn} missed in {block.frames} scored frames"]
+    told += [f"{block.true_empty} frames with nothing to find and nothing found"] if block.true_empty else []
+    told += [f"{block.unprocessed} labelled frames were not processed"] if block.unprocessed else []
+    if not block.exhaustive:
+        told.append(f"truth not exhaustive: {block.unmatched} unmatched detections prove nothing")
+    return elements.notes(told)

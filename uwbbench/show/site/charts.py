@@ -1,0 +1,66 @@
+"""Charts of a site as SVG pictures, in the colours of the page that they stand in."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+from uwbbench.api import registry
+from uwbbench.results.curves import error_curve
+from uwbbench.results.leaderboard.ranking import SETTINGS, Ranking
+from uwbbench.results.pareto import points
+from uwbbench.run.folder.identity import digest
+from uwbbench.show.charts import error_charts, speed_chart
+from uwbbench.show.charts.chart import Spec
+from uwbbench.show.charts.theme import PAGE
+from uwbbench.show.page.render import NEEDS, ReportToolsError
+from uwbbench.show.text.quantity import Quantity
+from uwbbench.show.text.sheet import shown
+
+WIDTH = 760
+
+
+def pareto(ranking: Ranking, metric: str, title: str, names: Mapping[str, str]) -> Spec | None:
+    """Speed against a metric, of the detectors that were timed and scored on all captures; None where there is none."""
+    members = {one.contender.key: one.scored for one in ranking.standings if len(one.scored) == ranking.captures}
+    speeds = {
+        one.contender.key: replace(one.speed, reference=shown(one.speed.reference))
+        for one in ranking.standings
+        if one.speed is not None
+    }
+    found = points(members, speeds, registry.load_plugin("metrics", metric), SETTINGS)
+    if not found:
+        return None
+    quantity = Quantity.of(metric, registry.load_plugin("metrics", metric))
+    return speed_chart.speed_against_error(f"{title}: speed against {quantity.title}", found, names, quantity)
+
+
+def errors(ranking: Ranking, title: str, names: Mapping[str, str]) -> Spec | None:
+    """Distribution of the errors; None where nothing was found."""
+    curves = {one.contender.key: error_curve([part.outcome for part in one.scored]) for one in ranking.standings}
+    known = {key: curve for key, curve in curves.items() if curve is not None}
+    return error_charts.error_cdf(f"{title}: errors", known, names) if known else None
+
+
+def svg(spec: Spec) -> str:
+    """SVG of a chart; what a screen reader says of it stands beside it, not inside.
+
+    Raises
+    ------
+    ReportToolsError
+        If vl-convert is not installed.
+    """
+    try:
+        import vl_convert
+    except ImportError as error:
+        raise ReportToolsError(NEEDS) from error
+    whole: dict[str, Any] = {**spec, "width": WIDTH, "config": PAGE}
+    drawn: str = vl_convert.vegalite_to_svg(whole)
+    plain = re.sub(r' (?:role|aria-[a-z]+)="[^"<>]*"', "", drawn)
+    # vl-convert counts clips through its whole life; on a page they must be distinct, and the same every time.
+    chart, places = digest(spec)[:8], dict[str, int]()
+    return re.sub(
+        r'(id="|url\(#)clip(\d+)', lambda m: f"{m[1]}clip-{chart}-{places.setdefault(m[2], len(places))}", plain
+    )

@@ -1,0 +1,384 @@
+"""What the pages of a site say: rows of cells, sentences and charts, made of suites and rankings."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+from uwbbench.api import registry
+from uwbbench.measure.accuracy.stats import Estimate
+from uwbbench.results.leaderboard.ranking import Pair, Ranking, Standing, rankings, reference_of
+from uwbbench.results.leaderboard.runs import Run
+from uwbbench.results.leaderboard.suites import Suite
+from uwbbench.show.site import charts
+from uwbbench.show.site.names import Names
+from uwbbench.show.text.quantity import Quantity
+from uwbbench.show.text.sheet import interval, number, shown
+from uwbbench.show.text.wording import TABLES
+
+SHOWN = ("f1", "recall", "precision", "mae", "p95", "false_alarms_per_minute")
+SHOWN_FIRST = ("f1", "recall", "mae", "p95")
+"""Metrics of a board on its own page, and on the index."""
+
+LONGEST_TEXT = 600
+
+VERDICTS = {
+    "differs": "differ",
+    "equal": "practically equal",
+    "undecided": "not told apart",
+    "too few groups": "too few groups to tell",
+    "undefined": "undefined: one of them found nothing",
+}
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One cell of a table.
+
+    Attributes
+    ----------
+    text : str
+    small : str
+        Second line: the interval.
+    key : str
+        What the cell is sorted by; the text if empty.
+    title : str
+        More about it.
+    link : str
+        Address, seen from the root of the site.
+    """
+
+    text: str
+    small: str = ""
+    key: str = ""
+    title: str = ""
+    link: str = ""
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table of cells with what a reader must know."""
+
+    title: str
+    columns: tuple[str, ...]
+    rows: tuple[tuple[Cell, ...], ...]
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Section:
+    """A dataset of a suite, as the index and its own page show it.
+
+    Attributes
+    ----------
+    suite : Suite
+    dataset, source : str
+    label, address : str
+    rankings : tuple of Ranking
+        The first is the one that the index shows.
+    """
+
+    suite: Suite
+    dataset: str
+    source: str
+    label: str
+    address: str
+    rankings: tuple[Ranking, ...] = field(repr=False)
+
+    @property
+    def main(self) -> Ranking:
+        """The first board."""
+        return self.rankings[0]
+
+    @property
+    def title(self) -> str:
+        """Name with what the captures are; simulated ones always say so."""
+        return f"{self.label}, {'SIMULATED' if self.source == 'simulated' else 'measured'}"
+
+
+class Content:
+    """All that a site shows.
+
+    Parameters
+    ----------
+    suites : sequence of Suite
+    runs : sequence of Run
+        The oldest first.
+    """
+
+    def __init__(self, suites: Sequence[Suite], runs: Sequence[Run]) -> None:
+        self.suites, self.runs = suites, runs
+        self.names = Names(suites)
+
+    @cached_property
+    def sections(self) -> list[Section]:
+        """Every dataset of every suite that anything could be scored on."""
+        found = []
+        for suite in self.suites:
+            boards: dict[tuple[str, str], list[Ranking]] = {}
+            for ranking in rankings(suite):
+                boards.setdefault(ranking.board[:2], []).append(ranking)
+            for (dataset, source), made in boards.items():
+                address = self.names.dataset_page(suite, dataset)
+                found.append(Section(suite, dataset, source, shown(dataset), address, tuple(made)))
+        return found
+
+    def of_suite(self, suite: Suite) -> list[Section]:
+        """Datasets of one suite."""
+        return [section for section in self.sections if section.suite is suite]
+
+    # Boards ----------------------------------------------------------------------------------------------------
+
+    def board(self, ranking: Ranking, metrics: Sequence[str] = SHOWN) -> Table:
+        """Leaderboard of one board."""
+        _, _, scoring, table = ranking.board
+        if not ranking.exhaustive:
+            metrics = [name for name in metrics if name in ("recall", "mae", "p95")]
+        quantities = {name: quantity(name) for name in metrics}
+        heads = [one.axis for one in quantities.values()]
+        columns = (
+            "detector",
+            "rank",
+            *heads,
+            "time ratio",
+            "against the first",
+            "captures",
+            "frames (n)",
+            "errors (n)",
+        )
+        leader = ranking.standings[0]
+        rows = []
+        for one in ranking.standings:
+            rank = Cell("–", key="n/a") if one.rank is None else Cell(str(one.rank))
+            cells = [self.detector_cell(one), rank]
+            cells += [metric_cell(by, one.estimates[name]) for name, by in quantities.items()]
+            cells += [speed_cell(one), self._against(ranking, leader, one)]
+            cells.append(Cell(f"{len(one.scored)} of {ranking.captures}", key=str(len(one.scored))))
+            frames = sum(len(part.outcome.group) for part in one.scored)
+            rows.append((*cells, Cell(str(frames)), Cell(str(one.estimates["mae"].n))))
+        title = f"{scoring} scoring, {TABLES[table]}"
+        return Table(title, columns, tuple(rows), tuple(self._board_notes(ranking)))
+
+    def detector_cell(self, one: Standing) -> Cell:
+        """Name of a detector with a link to its page."""
+        key = one.contender.key
+        title = f"{shown(one.contender.name)}, identity {one.contender.identity[:12]}"
+        return Cell(self.names.detectors[key], title=title, link=self.names.detector_page(one.contender))
+
+    def _against(self, ranking: Ranking, leader: Standing, one: Standing) -> Cell:
+        if one is leader:
+            return Cell("first", key="-1")
+        pair = ranking.pair(one.contender.key, leader.contender.key, ranking.main)
+        if pair is None:
+            return Cell("n/a")
+        word = {"differs": "worse" if pair.better == pair.second else "better", "equal": "equal"}.get(pair.verdict)
+        difference = pair_text(pair)
+        return Cell(word or pair.verdict, small=difference, title=f"adjusted p {p_text(pair.adjusted)}")
+
+    @staticmethod
+    def _board_notes(ranking: Ranking) -> Iterator[str]:
+        if not ranking.exhaustive:
+            yield (
+                "The truth does not name all that is visible: precision and F1 are undefined, errors are of matches, "
+                "and the rank is by recall."
+            )
+        if all(one.rank is None for one in ranking.standings):
+            yield "No ranks: captures, or blocks of a second, are too few to tell detectors apart."
+        elif any(one.rank is None for one in ranking.standings):
+            yield "– : no rank, as the detector was not scored on all captures of this board; its numbers are of fewer."
+
+    def sentence(self, section: Section) -> str:
+        """Who leads, and who is as good."""
+        ranking = section.main
+        first, others = ranking.standings[0], ranking.standings[1:]
+        by = quantity(ranking.main)
+        words: dict[str, list[str]] = {}
+        for one in others:
+            pair = ranking.pair(first.contender.key, one.contender.key, ranking.main)
+            if pair is not None:
+                words.setdefault(pair.verdict, []).append(self.names.detectors[one.contender.key])
+        text = (
+            f"{self.names.detectors[first.contender.key]} has the highest {by.title}, "
+            f"{by.value_of(first.estimates[ranking.main])} ({ranking.board[2]} scoring)"
+        )
+        for verdict, said in (
+            ("equal", "practically equal to it: {}"),
+            ("undecided", "not told apart from it: {}"),
+            ("differs", "significantly different from it: {}"),
+            ("too few groups", "too few captures to compare it with: {}"),
+            ("undefined", "nothing to compare it with: {}"),
+        ):
+            if verdict in words:
+                text += "; " + said.format(", ".join(words[verdict]))
+        return text + "."
+
+    # Charts ----------------------------------------------------------------------------------------------------
+
+    def pareto(self, section: Section, metric: str) -> tuple[str, str] | None:
+        """Chart of speed against a metric on the first board, with what it says in words."""
+        spec = charts.pareto(section.main, metric, section.title, self._labels(section.suite))
+        return None if spec is None else (charts.svg(spec), _described(spec))
+
+    def errors(self, section: Section) -> tuple[str, str] | None:
+        """Chart of the errors on the first board."""
+        spec = charts.errors(section.main, section.title, self._labels(section.suite))
+        return None if spec is None else (charts.svg(spec), _described(spec))
+
+    def _labels(self, suite: Suite) -> dict[str, str]:
+        return {one.key: self.names.detectors[one.key] for one in suite.contenders}
+
+    def pairs(self, ranking: Ranking) -> Table:
+        """All comparisons of a board."""
+        rows = []
+        for pair in ranking.pairs:
+            by = quantity(pair.metric)
+            names = [Cell(self.names.detectors[key]) for key in (pair.first, pair.second)]
+            counts = [Cell(str(pair.captures)), Cell(str(pair.difference.groups))]
+            verdict = Cell(VERDICTS[pair.verdict])
+            rows.append((*names, Cell(by.title), pair_cell(pair), Cell(p_text(pair.adjusted)), verdict, *counts))
+        columns = ("first", "second", "metric", "difference", "adjusted p", "verdict", "captures", "groups (n)")
+        return Table("Compared in pairs", columns, tuple(rows))
+
+    def suite_facts(self, suite: Suite) -> list[tuple[str, str]]:
+        """What a version of a suite stands for."""
+        reference = reference_of(suite)
+        rules = suite.newest.rules
+        machines = dict.fromkeys(machine for run in suite.runs for machine in run.machines)
+        return [
+            (
+                "version",
+                f"{suite.version[:12]}, of the content of {len(suite.captures)} captures and the scoring rules",
+            ),
+            ("scoring", f"{', '.join(rule.scoring for rule in rules)}; gate {100 * rules[0].gate_m:g} cm"),
+            ("runs", ", ".join(shown(run.name) for run in suite.runs)),
+            ("machines", "; ".join(line(machine) for machine in machines)),
+            ("reference of times", "none" if reference is None else shown(reference[0])),
+        ]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Everything for programs; undefined numbers are NaN, which the store writes as null."""
+        return {
+            "generator": "uwbbench leaderboard",
+            "suites": [
+                {
+                    "name": suite.name,
+                    "version": suite.version,
+                    "runs": [run.name for run in suite.runs],
+                    "captures": [
+                        {"dataset": dataset, "capture": capture, "sha256": content}
+                        for (dataset, capture), content in suite.captures.items()
+                    ],
+                    "boards": [_board_dict(one) for section in self.of_suite(suite) for one in section.rankings],
+                }
+                for suite in self.suites
+            ],
+        }
+
+
+def _board_dict(ranking: Ranking) -> dict[str, Any]:
+    dataset, source, scoring, table = ranking.board
+    who = {
+        one.contender.key: {"detector": one.contender.name, "identity": one.contender.identity}
+        for one in ranking.standings
+    }
+    return {
+        "dataset": dataset,
+        "source": source,
+        "scoring": scoring,
+        "table": table,
+        "ranked_by": ranking.main,
+        "captures": ranking.captures,
+        "standings": [
+            {
+                **who[one.contender.key],
+                "rank": one.rank,
+                "captures": len(one.scored),
+                "runs": [run.name for run in one.contender.runs],
+                "estimates": {name: vars(estimate) for name, estimate in one.estimates.items()},
+                "time_ratio": None
+                if one.speed is None
+                else {key: getattr(one.speed, key) for key in ("reference", "ratio", "low", "high")},
+            }
+            for one in ranking.standings
+        ],
+        "pairs": [
+            {
+                "first": who[pair.first],
+                "second": who[pair.second],
+                "metric": pair.metric,
+                "captures": pair.captures,
+                "difference": pair.difference.value,
+                "low": pair.difference.low,
+                "high": pair.difference.high,
+                "p_adjusted": pair.adjusted,
+                "verdict": pair.verdict,
+            }
+            for pair in ranking.pairs
+        ],
+    }
+
+
+def quantity(name: str) -> Quantity:
+    """How a metric is shown."""
+    return Quantity.of(name, registry.load_plugin("metrics", name))
+
+
+def metric_cell(by: Quantity, estimate: Estimate) -> Cell:
+    """Value with its interval below."""
+    text = number(estimate.value, by.digits, by.factor)
+    whole = interval(estimate.value, estimate.low, estimate.high, by.digits, by.factor)
+    ends = whole.removeprefix(text).strip()
+    return Cell(text, small=ends, key=_key(estimate.value), title=by.told(estimate))
+
+
+def speed_cell(one: Standing) -> Cell:
+    """Time ratio with its interval below; absolute times hold on one machine only and are not shown here."""
+    speed = one.speed
+    if speed is None:
+        return Cell("not timed", key="n/a")
+    whole = interval(speed.ratio, speed.low, speed.high, 2)
+    text = number(speed.ratio, 2)
+    return Cell(text, small=whole.removeprefix(text).strip(), key=_key(speed.ratio))
+
+
+def pair_text(pair: Pair) -> str:
+    """Difference with unit and interval."""
+    by, d = quantity(pair.metric), pair.difference
+    text = f"{interval(d.value, d.low, d.high, by.digits, by.factor)} {by.unit}".strip()
+    return re.sub(r"-(0\.0*)(?!\d)", r"\1", text)  # what rounds to nothing has no sign
+
+
+def pair_cell(pair: Pair) -> Cell:
+    """Difference of a pair."""
+    return Cell(pair_text(pair), key=_key(pair.difference.value))
+
+
+def p_text(value: float) -> str:
+    """A p-value; never rounded to 0.
+
+    Examples
+    --------
+    >>> p_text(0.0002), p_text(0.0312)
+    ('<0.001', '0.031')
+    """
+    if math.isnan(value):
+        return "n/a"
+    return "<0.001" if value < 0.001 else f"{value:.3f}"
+
+
+def line(text: str) -> str:
+    """Text on one line, without control characters, cut where it is very long."""
+    whole = "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in " ".join(text.split()))
+    return whole if len(whole) <= LONGEST_TEXT else f"{whole[:LONGEST_TEXT]}..."
+
+
+def _key(value: float) -> str:
+    return "n/a" if math.isnan(value) else f"{value:.6g}"
+
+
+def _described(spec: Mapping[str, Any]) -> str:
+    return f"{spec['title']['text']}. {spec['title'].get('subtitle', '')}"

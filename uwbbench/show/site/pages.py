@@ -1,0 +1,360 @@
+"""The pages of a site: an index, one for each dataset, one for each detector, and one about the runs."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+from uwbbench.measure.accuracy.stats import MINIMUM_GROUPS
+from uwbbench.results.leaderboard.ranking import COMPARED, MARGINS, SETTINGS, SIGNIFICANCE, speeds_by_machine
+from uwbbench.results.leaderboard.suites import Contender, Suite
+from uwbbench.show.site.content import (
+    SHOWN_FIRST,
+    VERDICTS,
+    Cell,
+    Content,
+    Section,
+    Table,
+    line,
+    metric_cell,
+    p_text,
+    pair_cell,
+    quantity,
+)
+from uwbbench.show.text.sheet import interval, number, shown
+from uwbbench.show.text.wording import TABLES
+
+
+@dataclass(frozen=True)
+class Part:
+    """A section of a page.
+
+    Attributes
+    ----------
+    title : str
+    sentences, notes : tuple of str
+        Above and below the rest.
+    facts : tuple of (str, str)
+    charts : tuple of (str, str)
+        SVG, and what it says in words.
+    tables : tuple of Table
+    folded : tuple of Table
+        Tables that are opened on demand.
+    text : str
+        Shown as it is, opened on demand.
+    link : (str, str)
+        Address and text of where there is more; empty if nowhere.
+    """
+
+    title: str
+    sentences: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+    facts: tuple[tuple[str, str], ...] = ()
+    charts: tuple[tuple[str, str], ...] = ()
+    tables: tuple[Table, ...] = ()
+    folded: tuple[Table, ...] = ()
+    text: str = ""
+    link: tuple[str, str] = ("", "")
+
+
+@dataclass(frozen=True)
+class Page:
+    """A page before it is HTML.
+
+    Attributes
+    ----------
+    address : str
+        Seen from the root of the site.
+    title, badge, lead : str
+        The badge says whether captures are measured or simulated.
+    parts : tuple of Part
+    """
+
+    address: str
+    title: str
+    badge: str
+    lead: str
+    parts: tuple[Part, ...]
+
+    @property
+    def root(self) -> str:
+        """From this page to the root of the site."""
+        return "../" * self.address.count("/")
+
+
+HOW = (
+    f"Rank: one more than the number of detectors that are better by more than chance (Holm-adjusted p below "
+    f"{SIGNIFICANCE:g}) and more than the margin. Detectors share ranks.",
+    f"Practically equal: the whole {SETTINGS['confidence']:.0%} interval of the difference lies within the margin, "
+    f"{MARGINS['']:g} of a share or {100 * MARGINS['m']:g} cm of an error. Not told apart: the captures do not decide.",
+    "Pairs are compared on the captures that both were scored on, on the same bootstrap draws of captures; of blocks "
+    f"of a second where captures are fewer than {MINIMUM_GROUPS}. Brackets: {SETTINGS['confidence']:.0%} intervals.",
+    "Time is only given as a ratio to the common reference detector, measured in alternating blocks on one machine. "
+    "Over several machines: geometric mean, and the interval from the lowest end to the highest.",
+)
+
+
+def pages(content: Content) -> Iterator[Page]:
+    """All pages of a site."""
+    yield _index(content)
+    for section in content.sections:
+        yield _dataset(content, section)
+    seen = set()
+    for suite in content.suites:
+        for contender in suite.contenders:
+            if contender.key not in seen:
+                seen.add(contender.key)
+                yield _detector(content, contender)
+    yield _runs(content)
+
+
+def _badge(sources: set[str]) -> str:
+    kinds = {frozenset({"simulated"}): "SIMULATED", frozenset({"measured"}): "MEASURED", frozenset(): "NO RESULT"}
+    return kinds.get(frozenset(sources), "MEASURED AND SIMULATED")
+
+
+def _index(content: Content) -> Page:
+    parts = []
+    for suite in content.suites:
+        sections = content.of_suite(suite)
+        name = content.names.suite(suite)
+        if not sections:
+            parts.append(
+                Part(name, sentences=("Nothing could be scored; the pages of its detectors and runs say why.",))
+            )
+        for place, section in enumerate(sections):
+            chart = content.pareto(section, section.main.main)
+            none = "No chart: no detector was both timed against the reference and scored on all captures."
+            parts.append(
+                Part(
+                    title=f"{name}: {section.title}",
+                    sentences=(content.sentence(section),),
+                    facts=tuple(content.suite_facts(suite)) if place == 0 else (),
+                    charts=() if chart is None else (chart,),
+                    notes=(none,) if chart is None else (),
+                    tables=(content.board(section.main, SHOWN_FIRST),),
+                    link=(section.address, "All scorings, captures and comparisons"),
+                )
+            )
+    detectors = len(content.names.detectors)
+    lead = f"{detectors} detectors in {len(content.runs)} verified runs. "
+    lead += "Only what was measured on the same captures under the same scoring rules is compared."
+    parts.append(Part("How to read it", notes=HOW))
+    return Page("index.html", "Leaderboard", _badge({one.source for one in content.sections}), lead, tuple(parts))
+
+
+def _dataset(content: Content, section: Section) -> Page:
+    suite = section.suite
+    drawn = [content.pareto(section, name) for name in (section.main.main, "mae")] + [content.errors(section)]
+    first = Part(
+        title="Speed and error",
+        sentences=(content.sentence(section),),
+        charts=tuple(chart for chart in drawn if chart is not None),
+    )
+    boards = [
+        Part(
+            title=f"{ranking.board[2]} scoring, {TABLES[ranking.board[3]]}",
+            tables=(content.board(ranking),),
+            folded=(content.pairs(ranking),),
+        )
+        for ranking in section.rankings
+    ]
+    facts = Part("What was compared", facts=tuple(content.suite_facts(suite)), tables=(_captures(section),))
+    lead = f"Dataset of {content.names.suite(suite)}."
+    parts = (first, *boards, facts, Part("How to read it", notes=HOW))
+    return Page(section.address, section.label, _badge({section.source}), lead, parts)
+
+
+def _captures(section: Section) -> Table:
+    """Captures with licence and content; one that nobody could open is told too."""
+    rows = []
+    for capture in section.suite.captures_of(section.dataset):
+        sha256 = section.suite.captures[section.dataset, capture]
+        header = _header(section, capture)
+        about = (
+            ["n/a"] * 5
+            if header is None
+            else [
+                str(len(header)),
+                "none" if header.radar.channel is None else str(header.radar.channel),
+                line(header.license),
+                line(header.citation),
+                line(header.description),
+            ]
+        )
+        rows.append(tuple(Cell(text) for text in (shown(capture), *about, sha256[:12] or "not opened by any run")))
+    columns = ("capture", "frames", "channel", "licence", "citation", "description", "content")
+    return Table("Captures", columns, tuple(rows))
+
+
+def _header(section: Section, capture: str) -> Any:
+    for contender in section.suite.contenders:
+        run, entry = contender.chosen.get((section.dataset, capture), (None, None))
+        if run is not None and entry is not None and entry.status == "done":
+            return run.folder.header(entry.capture_id)
+    return None
+
+
+# Detectors -----------------------------------------------------------------------------------------------------
+
+
+def _detector(content: Content, contender: Contender) -> Page:
+    mine = [(suite, one) for suite in content.suites for one in suite.contenders if one.key == contender.key]
+    sections = [section for section in content.sections if any(suite is section.suite for suite, _ in mine)]
+    label = content.names.detectors[contender.key]
+    parts = [
+        Part("Results", tables=(_results(content, contender, sections),)),
+        Part("Against the others", tables=tuple(_others(content, contender, sections))),
+        Part(
+            "Time",
+            tables=(_times(content, mine),),
+            notes=(
+                "The ratio to the reference travels between machines; the median time holds on its own machine only.",
+            ),
+        ),
+        Part("What did not work", tables=(_failures(mine),), notes=tuple(_notes(mine))),
+        Part("Detector", facts=tuple(_facts(mine)), text=json.dumps(contender.config, indent=2, ensure_ascii=False)),
+    ]
+    others = [
+        content.names.detectors[one.key]
+        for suite in content.suites
+        for one in suite.contenders
+        if one.name == contender.name and one.key != contender.key
+    ]
+    versions = f" Other versions of the same name: {', '.join(dict.fromkeys(others))}." if others else ""
+    lead = f"Identity {contender.identity[:12]}: steps, parameters and sources.{versions}"
+    return Page(content.names.detector_page(contender), label, _badge({s.source for s in sections}), lead, tuple(parts))
+
+
+def _results(content: Content, contender: Contender, sections: list[Section]) -> Table:
+    names = ("f1", "recall", "precision", "mae", "p95")
+    rows = []
+    for section in sections:
+        for ranking in section.rankings:
+            for one in ranking.standings:
+                if one.contender.key != contender.key:
+                    continue
+                about = [
+                    Cell(section.title, link=section.address),
+                    Cell(content.names.suite(section.suite)),
+                    Cell(f"{ranking.board[2]}, after {ranking.board[3]}"),
+                    Cell("–", key="n/a") if one.rank is None else Cell(f"{one.rank} of {len(ranking.standings)}"),
+                ]
+                captures = Cell(f"{len(one.scored)} of {ranking.captures}")
+                rows.append((*about, *(metric_cell(quantity(name), one.estimates[name]) for name in names), captures))
+    columns = ("dataset", "suite", "scoring", "rank", *(quantity(name).axis for name in names), "captures")
+    return Table("On each dataset", columns, tuple(rows))
+
+
+def _others(content: Content, contender: Contender, sections: list[Section]) -> Iterator[Table]:
+    """Comparisons with all others on the first board of each dataset."""
+    for section in sections:
+        ranking = section.main
+        rows = []
+        for one in ranking.standings:
+            for name in COMPARED:
+                pair = ranking.pair(contender.key, one.contender.key, name)
+                if pair is None:
+                    continue
+                word = VERDICTS[pair.verdict]
+                if pair.better is not None:
+                    word = "better" if pair.better == contender.key else "worse"
+                cells = (Cell(quantity(name).title), pair_cell(pair), Cell(p_text(pair.adjusted)), Cell(word))
+                rows.append((content.detector_cell(one), *cells, Cell(str(pair.captures))))
+        columns = ("other detector", "metric", "difference: this one minus the other", "adjusted p", "this one is")
+        yield Table(f"{section.title}, {ranking.board[2]} scoring", (*columns, "captures"), tuple(rows))
+
+
+def _times(content: Content, mine: list[tuple[Suite, Contender]]) -> Table:
+    rows = []
+    for suite, contender in mine:
+        for dataset in suite.datasets:
+            for machine, speed in speeds_by_machine(suite, contender, dataset).items():
+                ratio = interval(speed.ratio, speed.low, speed.high, 3)
+                about = (line(machine), content.names.suite(suite), shown(dataset), shown(speed.reference))
+                times = (
+                    Cell(ratio, key=f"{speed.ratio:.6g}"),
+                    Cell(number(speed.p50_us, 0)),
+                    Cell(str(speed.captures)),
+                )
+                rows.append((*map(Cell, about), *times))
+    columns = ("machine", "suite", "dataset", "reference", "time ratio", "median of a frame (us)", "timed captures (n)")
+    return Table("On each machine", columns, tuple(rows))
+
+
+def _failures(mine: list[tuple[Suite, Contender]]) -> Table:
+    """Captures on which it failed, and scorings that were impossible, with reasons."""
+    rows = []
+    for suite, contender in mine:
+        for run, entry in contender.chosen.values():
+            reasons = [entry.reason] if entry.status == "failed" else []
+            reasons += [f"{row['scoring']}: {row['reason']}" for row in entry.scores if row["status"] == "unscored"]
+            about = (suite.name, entry.dataset, entry.capture, run.name)
+            rows += [tuple(Cell(line(text)) for text in (*about, reason)) for reason in reasons]
+    return Table("Failed or not scored", ("suite", "dataset", "capture", "run", "reason"), tuple(rows))
+
+
+def _notes(mine: list[tuple[Suite, Contender]]) -> Iterator[str]:
+    for _, contender in mine:
+        yield from (line(text) for text in contender.disagreements)
+        hard = contender.stability
+        if hard is not None and "refused" in hard:
+            yield f"It refuses the capture of the hard cases: {line(hard['refused'])}"
+        elif hard is not None:
+            yield (
+                f"Hard cases (SIMULATED): {hard['passed']} passed, {hard['failed']} failed, "
+                f"{hard['not_applicable']} not applicable."
+            )
+
+
+def _facts(mine: list[tuple[Suite, Contender]]) -> Iterator[tuple[str, str]]:
+    contender = mine[0][1]
+    newest = contender.runs[-1]
+    yield "name", line(contender.name)
+    yield "identity", contender.identity
+    yield "fidelity", str(contender.config["fidelity"])
+    yield "runs", ", ".join(dict.fromkeys(shown(run.name) for _, one in mine for run in one.runs))
+    for use in dict.fromkeys(step["use"] for step in contender.config["pipeline"]):
+        yield f"source of {shown(use)}", newest.manifest["sources"][use][:12]
+
+
+# Runs ----------------------------------------------------------------------------------------------------------
+
+
+def _runs(content: Content) -> Page:
+    rows = []
+    for run in content.runs:
+        suite = next(suite for suite in content.suites if run in suite.runs)
+        failed = sum(entry.status == "failed" for entry in run.entries)
+        versions = run.manifest["sessions"][-1]["versions"]
+        checked = ", ".join(f"{count} {what}" for what, count in run.checked.items())
+        cells = (
+            shown(run.name),
+            content.names.suite(suite),
+            run.started,
+            "; ".join(line(machine) for machine in run.machines),
+            f"uwbbench {shown(versions['uwbbench'])}, numpy {shown(versions['numpy'])}",
+            str(len(run.manifest["detectors"])),
+            f"{len(run.entries) - failed} done, {failed} failed",
+            checked,
+        )
+        rows.append(tuple(map(Cell, cells)))
+    columns = ("run", "suite", "started", "machine", "versions", "detectors", "units", "verified")
+    failures = [
+        tuple(Cell(line(text)) for text in (run.name, entry.kind, entry.detector, entry.dataset, entry.reason))
+        for run in content.runs
+        for entry in run.entries
+        if entry.status == "failed" and entry.kind != "accuracy"
+    ]
+    kinds = ("run", "what", "detector", "dataset", "reason")
+    parts = (
+        Part("Runs", tables=(Table("Runs", columns, tuple(rows)),)),
+        Part("What could not be listed, timed or examined", tables=(Table("Failures", kinds, tuple(failures)),)),
+    )
+    lead = (
+        "Every run was verified before anything was taken from it: files against their hashes, names and identities "
+        "against the manifest, scores against the stored detections. Detections themselves are taken as they are."
+    )
+    return Page("runs.html", "Runs", _badge({one.source for one in content.sections}), lead, parts)

@@ -1,0 +1,172 @@
+"""A report in formats for other programs: CSV tables, LaTeX, JSON; and never over a file that is no report.
+
+Conventions
+-----------
+* Text files say in their first line that they are a report of uwbbench; only such files are replaced without being
+  asked.
+* CSV holds whole numbers of significant digits in SI units, as the names of the columns say. ``nan`` is undefined, an
+  empty cell was not measured. A text that a spreadsheet would take for a formula gets an apostrophe in front.
+* LaTeX tables are those of the Markdown report, for ``booktabs``, with every special character escaped.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from uwbbench.api.errors import StoreError
+from uwbbench.results.report import Report
+from uwbbench.run.folder.files import write_json, write_text
+from uwbbench.run.folder.identity import plain
+from uwbbench.show.text.report import sheets
+from uwbbench.show.text.sheet import Sheet
+
+MARK = "uwbbench report"
+INDEX = "tables.json"
+"""File that tells a folder of CSV tables from any other folder."""
+
+_LATEX = {
+    "\\": r"\textbackslash{}",
+    "{": r"\{",
+    "}": r"\}",
+    "$": r"\$",
+    "&": r"\&",
+    "#": r"\#",
+    "%": r"\%",
+    "_": r"\_",
+    "^": r"\textasciicircum{}",
+    "~": r"\textasciitilde{}",
+    "<": r"\textless{}",
+    ">": r"\textgreater{}",
+    "|": r"\textbar{}",
+    '"': r"\textquotedbl{}",
+    "`": r"\textasciigrave{}",
+}
+
+
+def check_replaceable(path: Path, *, force: bool) -> None:
+    """Refuse to write over a file or folder that is no report.
+
+    Raises
+    ------
+    StoreError
+        If there is one, unless forced. A folder is never replaced by a file, nor a file by a folder.
+    """
+    if not path.exists() or force:
+        return
+    if path.is_dir():
+        ours = (path / INDEX).is_file() or not any(path.iterdir())
+    else:
+        with path.open("rb") as file:
+            ours = MARK.encode() in file.read(4096)
+    if not ours:
+        raise StoreError(f"{path}: exists and is no report of uwbbench; give another name, or --force to replace it")
+
+
+def write_csv(report: Report, folder: Path) -> None:
+    """Write every table into a folder, one file each, with an index.
+
+    Raises
+    ------
+    StoreError
+        If a file cannot be written.
+    """
+    written = {}
+    for name, rows in _csv_tables(report).items():
+        write_text(folder / f"{name}.csv", _csv(rows))
+        written[name] = len(rows)
+    write_json(folder / INDEX, {"generator": MARK, "experiment": report.experiment["name"], "rows": written})
+
+
+def _csv_tables(report: Report) -> dict[str, list[dict[str, Any]]]:
+    leaderboard: list[dict[str, Any]] = report.leaderboard.to_dict("records")  # type: ignore[assignment]
+    for row in leaderboard:
+        if math.isnan(row["p50_us"]):  # not undefined: not measured
+            row |= {"p50_us": None, "p99_us": None}
+    stability = [{key: value for key, value in one.items() if key != "cases"} for one in report.stability]
+    keys = ("kind", "detector", "dataset", "capture", "reason")
+    return {
+        "leaderboard": leaderboard,
+        "paper_tables": report.paper_tables.to_dict("records"),  # type: ignore[dict-item]
+        "latency": report.latency.drop(columns=["notes"], errors="ignore").to_dict("records"),  # type: ignore[dict-item]
+        "captures": report.captures,
+        "stability": stability,
+        "failures": [{key: getattr(entry, key) for key in keys} for entry in report.failures],
+        "unscored": [
+            {"detector": e.detector, "dataset": e.dataset, "capture": e.capture, "scoring": scoring, "reason": reason}
+            for e, scoring, reason in report.unscored
+        ],
+    }
+
+
+def _csv(rows: Sequence[Mapping[str, Any]]) -> str:
+    columns = list(dict.fromkeys(name for row in rows for name in row))
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(columns)
+    writer.writerows([_cell(row.get(name)) for name in columns] for row in rows)
+    return text.getvalue()
+
+
+def _cell(value: Any) -> str:
+    if value is None:
+        return ""
+    if isinstance(value, float):
+        return f"{value:.9g}"
+    text = str(value)
+    return f"'{text}" if text[:1] in "=+-@\t\r" and text else text
+
+
+def latex(report: Report) -> str:
+    """Every table for LaTeX; the preamble needs ``booktabs``, ``textcomp`` and T1 fonts."""
+    lines = [
+        f"% {MARK}; needs \\usepackage{{booktabs}} and \\usepackage[T1]{{fontenc}}",
+        *(_latex_table(sheet) for sheet in sheets(report)),
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def _latex_table(sheet: Sheet) -> str:
+    rows = [_latex_row(row) for row in sheet.rows] or ["None." + " &" * (len(sheet.columns) - 1) + r" \\"]
+    notes = [rf"\par\footnotesize {latex_escaped(note)}" for note in sheet.notes]
+    lines = [
+        r"\begin{table*}",
+        r"\centering\small",
+        rf"\caption{{{latex_escaped(sheet.title)}}}",
+        rf"\begin{{tabular}}{{l{'r' * (len(sheet.columns) - 1)}}}",
+        r"\toprule",
+        _latex_row(sheet.columns),
+        r"\midrule",
+        *rows,
+        r"\bottomrule",
+        r"\end{tabular}",
+        *notes,
+        r"\end{table*}",
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def _latex_row(cells: Iterable[str]) -> str:
+    return " & ".join(latex_escaped(cell) for cell in cells) + r" \\"
+
+
+def latex_escaped(text: str) -> str:
+    r"""Text that LaTeX shows as it is, on one line.
+
+    Examples
+    --------
+    >>> print(latex_escaped("50 % of a_b -- [x]"))
+    50 \% of a\_b -{}- [x]
+    """
+    line = "".join(_LATEX.get(char, char) for char in " ".join(text.split())).replace("--", "-{}-")
+    return f"{{}}{line}" if line[:1] in ("[", "*") else line  # behind a line break these would be its options
+
+
+def as_json(report: Report) -> dict[str, Any]:
+    """Whole report as plain values, undefined numbers as None."""
+    values: dict[str, Any] = plain({"generator": MARK, **report.to_dict()})
+    return values

@@ -1,0 +1,73 @@
+"""The two tables of arXiv 2512.01018 and its counts of peaks, as texts beside what the paper says."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+from uwbbench.results import published
+from uwbbench.show.text.sheet import Sheet, interval, number, shown
+from uwbbench.show.text.wording import TABLES, TITLES, scale
+
+if TYPE_CHECKING:
+    from uwbbench.results.report import Report
+
+_METRICS = ("mae", "p90", "p95", "sd", "precision", "recall", "f1")
+_UNKNOWN = "not known"
+
+
+def paper_sheets(report: Report) -> Iterator[Sheet]:
+    """Both tables; with the published figures, and peaks through the chain, where the run covers all their rows."""
+    table = report.paper_tables
+    if table.empty:
+        return
+    units = {name: scale(report.metrics[name].unit) for name in _METRICS}
+    heads = tuple(TITLES[name] + units[name][0] for name in _METRICS)
+    for kind in table["table"].unique():
+        rows = [
+            (
+                shown(row["detector"]),
+                row["scoring"],
+                shown(row["dataset"]),
+                number(row["channel"], 0),
+                shown(row["material"]),
+                row["source"],
+                *(interval(row[name], row[f"{name}_low"], row[f"{name}_high"], *units[name][1:]) for name in _METRICS),
+                str(row["mae_n"]),
+                str(row["frames"]),
+            )
+            for row in table[table["table"] == kind].to_dict("records")
+        ]
+        notes: tuple[str, ...] = ()
+        if report.repeats_the_paper:
+            rows = sorted([*rows, *_published(kind, units)], key=lambda row: row[3:5])  # channel, then material
+            notes = (f"'{_UNKNOWN}': the figure of {published.NAME} could not be read.", *published.NOTES[kind])
+        columns = ("detector", "scoring", "dataset", "channel", "material", "source", *heads, "n", "frames")
+        yield Sheet(f"By channel and material, {TABLES[kind]}", columns, tuple(rows), notes)
+    if report.repeats_the_paper:
+        yield _chain(report)
+
+
+def _published(kind: str, units: dict[str, tuple[str, int, float]]) -> Iterator[tuple[str, ...]]:
+    for channel, material in published.ROWS:
+        found = [(published.known(kind, channel, material, name), units[name]) for name in _METRICS]
+        cells = [_UNKNOWN if value is None else number(value, digits + 1, by) for value, (_, digits, by) in found]
+        yield published.NAME, "peak", "its recordings", str(channel), material, "published", *cells, _UNKNOWN, _UNKNOWN
+
+
+def _chain(report: Report) -> Sheet:
+    counts = report.chains
+    steps = {title: published.STEPS.get(title, title) for title in published.CHAIN}
+    rows = []
+    for (detector, dataset), group in counts.groupby(["detector", "dataset"], sort=False):
+        left = dict(zip(group["step"], group["count"], strict=True))
+        if steps["peaks"] in left:
+            rows.append(
+                (shown(str(detector)), shown(str(dataset)), *(str(left.get(step, "n/a")) for step in steps.values()))
+            )
+    rows.append((published.NAME, "its demonstration", *map(str, published.CHAIN.values())))
+    notes = (
+        "Runs differ in length from the paper's, so compare the shares that are left. A detector that keeps the "
+        "strongest peak of a frame drops the others behind the phase difference.",
+    )
+    return Sheet("Peaks through the chain", ("detector", "dataset", *published.CHAIN), tuple(rows), notes)

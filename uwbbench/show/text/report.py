@@ -1,0 +1,202 @@
+"""A report as tables of text, as Markdown, and as a file in its run folder."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from uwbbench.measure.accuracy.stats import MINIMUM_GROUPS
+from uwbbench.results.report import Report
+from uwbbench.show.text.limits_sheets import limits_sheets
+from uwbbench.show.text.paper_sheets import paper_sheets
+from uwbbench.show.text.sheet import Sheet, escaped, interval, number, shown
+from uwbbench.show.text.wording import TABLES, TITLES, scale
+
+LONGEST_LINE = 600
+
+
+def sheets(report: Report) -> list[Sheet]:
+    """All tables of a report: leaderboards, the paper's tables, times, and what did not work."""
+    made = Tables(report)
+    parts = (made.leaderboards, made.paper, made.limits, made.latency, made.stability, made.captures, made.failed)
+    return [sheet for part in parts for sheet in part()]
+
+
+class Tables:
+    """The tables of a report by what they are about; one that would be empty is left out.
+
+    Parameters
+    ----------
+    report : Report
+    """
+
+    def __init__(self, report: Report) -> None:
+        self._report = report
+
+    def leaderboards(self) -> Iterator[Sheet]:
+        """One for each dataset, scoring and table."""
+        return _leaderboards(self._report)
+
+    def paper(self) -> Iterator[Sheet]:
+        """The two tables of arXiv 2512.01018."""
+        return paper_sheets(self._report)
+
+    def limits(self) -> Iterator[Sheet]:
+        """Detectors against physical limits, where the run has test signals."""
+        return limits_sheets(self._report.limits)
+
+    def latency(self) -> Iterator[Sheet]:
+        """Times of every detector and timed capture."""
+        if not self._report.latency.empty:
+            yield _latency(self._report)
+
+    def stability(self) -> Iterator[Sheet]:
+        """How the detectors stood the hard cases."""
+        if self._report.stability:
+            yield _stability(self._report)
+
+    def captures(self) -> Iterator[Sheet]:
+        """What was compared on, with licence."""
+        keys = ("dataset", "capture", "source", "frames", "license", "description")
+        if self._report.captures:
+            rows = tuple(tuple(_line(str(one[key])) for key in keys) for one in self._report.captures)
+            yield Sheet("Captures", keys, rows)
+
+    def failed(self) -> Iterator[Sheet]:
+        """What did not run, and what could not be scored, with reasons."""
+        if self._report.failures:
+            failed = tuple(
+                (str(e.kind), shown(e.detector), shown(e.dataset), shown(e.capture), _line(e.reason))
+                for e in self._report.failures
+            )
+            yield Sheet("Failed", ("what", "detector", "dataset", "capture", "reason"), failed)
+        if self._report.unscored:
+            rows = tuple(
+                (shown(e.detector), shown(e.capture), scoring, _line(reason))
+                for e, scoring, reason in self._report.unscored
+            )
+            yield Sheet("Not scored", ("detector", "capture", "scoring", "reason"), rows)
+
+
+def markdown(report: Report) -> str:
+    """Whole report as Markdown."""
+    name, about = report.experiment["name"], report.experiment["description"]
+    lines = ["<!-- uwbbench report -->", f"# {escaped(shown(name))}", ""]
+    if about:
+        lines += [escaped(" ".join(about.split())), ""]
+    lines += [sheet.markdown() for sheet in sheets(report)]
+    if report.notes:
+        lines += ["## Notes", "", *(f"* {escaped(_line(note))}" for note in report.notes), ""]
+    session = report.folder.manifest["sessions"][-1]
+    machine, versions = session["machine"], session["versions"]
+    made = f"uwbbench {versions['uwbbench']}, Python {versions['python']}, {machine['cpu']}, {machine['os']}"
+    lines += [f"Made with {escaped(made)}; started {session['started']}."]
+    return "\n".join(lines) + "\n"
+
+
+def write_report(report: Report) -> Path:
+    """Write ``report.md`` into its run folder."""
+    return report.folder.write_text("report.md", markdown(report))
+
+
+def _line(text: str) -> str:
+    """Text on one line, without control characters, cut where it is very long."""
+    line = "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in " ".join(text.split()))
+    return line if len(line) <= LONGEST_LINE else f"{line[:LONGEST_LINE]}..."
+
+
+def _leaderboards(report: Report) -> Iterator[Sheet]:
+    """One sheet for each dataset, source, scoring and table."""
+    units = {name: metric.unit for name, metric in report.metrics.items()} | {"matched_mae": "m"}
+    groups: dict[tuple[str, ...], list[tuple[dict[str, Any], Any]]] = {}
+    for about, found in report.estimates:
+        key = about["dataset"], about["source"], about["scoring"], about["table"]
+        groups.setdefault(key, []).append((about, found))
+    for (dataset, source, scoring, table), members in groups.items():
+        open_world = any(not about["exhaustive"] for about, _ in members)
+        hidden = ("precision", "f1", "false_alarms_per_minute") if open_world else ()
+        names = [name for name in members[0][1] if name not in hidden]
+        heads = [TITLES.get(name, name) + scale(units[name])[0] for name in names]
+        extra = (["chance recall"] if open_world else []) + ["n", "frames", "p50 (us)", "p99 (us)"]
+        rows = []
+        for about, found in members:
+            cells = [interval(e.value, e.low, e.high, *scale(units[name])[1:]) for name in names for e in [found[name]]]
+            cells += [number(about["chance_recall"], 3)] if open_world else []
+            frames = f"{about['scored_frames']} of {about['frames']}"
+            cells += [str(found["mae"].n), frames, number(about["p50_us"], 0), number(about["p99_us"], 0)]
+            rows.append((shown(about["detector"]), *cells))
+        title = f"{shown(dataset)}, {source.upper()}: {scoring} scoring, {TABLES[table]}"
+        yield Sheet(title, ("detector", *heads, *extra), tuple(rows), tuple(_leaderboard_notes(members, open_world)))
+
+
+def _leaderboard_notes(members: list[tuple[dict[str, Any], Any]], open_world: bool) -> Iterator[str]:
+    yield "Errors are those of all retained detections; 'of matches' counts true positives only: read it with recall."
+    if open_world:
+        yield (
+            "The truth does not name all that is visible, so an unmatched detection proves nothing: precision and F1 "
+            "are undefined; errors are of matches, and recall is to be read against that of random ranges."
+        )
+    if all(estimate["recall"].groups < MINIMUM_GROUPS for _, estimate in members):
+        yield f"No intervals: fewer than {MINIMUM_GROUPS} groups (captures, or blocks of a second)."
+        for about, found in members:
+            values = ", ".join(number(value, 3) for value in found["recall"].per_group)
+            yield f"Recall of each group, {shown(about['detector'])}: {values or 'none'}"
+    for about, _ in members:
+        if about["invalid"] or about["unprocessed"]:
+            yield (
+                f"{shown(about['detector'])}: {about['invalid']} frames invalid or not processed, "
+                f"{about['unprocessed']} of them with known truth"
+            )
+    yield "Times hold on this machine only."
+
+
+def _stability(report: Report) -> Sheet:
+    columns: tuple[str, ...] = ("detector", "echo found (%)", "passed", "failed", "not applicable", "largest error (m)")
+    columns += ("largest error (ulp)", "flips by float32 (%)", "flips by one ulp (%)")
+    rows: list[tuple[str, ...]] = []
+    notes: list[str] = []
+    for one in report.stability:
+        name = shown(one["detector"])
+        if "refused" in one:
+            rows.append((name, *["n/a"] * (len(columns) - 1)))
+            notes.append(f"{name} cannot run on the capture of the hard cases: {_line(one['refused'])}")
+            continue
+        counts = [str(one[key]) for key in ("passed", "failed", "not_applicable")]
+        sizes = ["n/a" if one[key] is None else f"{one[key]:.1e}" for key in ("largest_error_m", "largest_error_ulp")]
+        flips = [number(one[key], 2, 100.0) for key in ("flips_float32", "flips_one_ulp")]
+        rows.append((name, number(one["usual_hits"], 0, 100.0), *counts, *sizes, *flips))
+        failed = [f"{case['case']} ({_line(case['detail'])})" for case in one["cases"] if case["status"] == "failed"]
+        notes += [f"{name} failed: {shown('; '.join(failed))}"] if failed else []
+    about = (
+        "Inputs at which numerical code breaks, made by uwbbench and SIMULATED; 'uwbbench stability' tells each case."
+    )
+    return Sheet("Hard cases", columns, tuple(rows), (about, *notes))
+
+
+def _latency(report: Report) -> Sheet:
+    times = ("p50_us", "p90_us", "p95_us", "p99_us", "max_us", "clustering_p50_us", "amortised_us", "throughput_us")
+    heads = ("p50", "p90", "p95", "p99", "max", "clustering call", "amortised", "batch a frame")
+    table = report.latency
+    rows = []
+    for row in table.to_dict("records"):
+        cells = [shown(row["detector"]), shown(row["capture"]), *(number(row[name], 1) for name in times)]
+        cells += [interval(row["ratio"], row["ratio_low"], row["ratio_high"], 3), number(row["total_ratio"], 3)]
+        cells += [number(row["missed_share"], 2, 100.0), number(row["missed_share_high"], 2, 100.0)]
+        cells += [str(row["longest_burst"]), number(row["startup_s"], 2), number(row["peak_memory_bytes"], 0, 1e-6)]
+        rows.append((*cells, number(row["overhead_us"], 1), str(row["n"])))
+    references = ", ".join(sorted({name for name in table["reference"] if isinstance(name, str)})) or "none"
+    columns = ("detector", "capture", *(f"{head} (us)" for head in heads), "ratio to reference", "ratio of all time")
+    columns += ("missed (%)", "at most (%)", "longest burst", "start-up (s)", "memory (MB)", "harness (us)", "calls")
+    notes = (
+        "THIS MACHINE ONLY: times in us of single calls, one frame each, on one core with one thread.",
+        f"What travels is the ratio to a reference detector ({references}), measured in alternating blocks.",
+        "Ratio of all time: of all blocks together, in which rare expensive calls count as much as they take.",
+        "n/a: too few calls for that percentile (36, 72 and 368 for P90, P95 and P99), or not told by the detector.",
+        "At most: upper end of the 95 % interval of the share of missed deadlines, for independent calls.",
+        "harness: the same loop with a detector that does nothing.",
+    )
+    told = dict.fromkeys(
+        f"{shown(row['detector'])}: {row['notes']}" for row in table.to_dict("records") if row["notes"]
+    )
+    return Sheet("Latency", columns, tuple(rows), (*notes, *told))

@@ -1,6 +1,0 @@
-"""Hard cases: inputs at which numerical code breaks, each with what a detector is expected to do."""
-
-from uwbbench.stability.case import Case, Outcome
-from uwbbench.stability.suite import Stability, all_cases, case_named, examine
-
-__all__ = ["Case", "Outcome", "Stability", "all_cases", "case_named", "examine"]

@@ -1,0 +1,1 @@
+"""Programs built on the benchmark: check, tune, gate, scaffold, fetch, warm-up, schema, pytest plugin."""

@@ -1,0 +1,246 @@
+"""Checks of a metric: pure, mergeable in any order, and right where the answer is known."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Mapping
+from functools import cached_property
+from typing import Any, ClassVar, get_args, get_type_hints
+
+import numpy as np
+from numpy.typing import NDArray
+
+from uwbbench.api.metric import Metric, Outcome
+from uwbbench.measure.accuracy.stats import bootstrap, evaluate, merge
+from uwbbench.tools.check.check import Kind, Nonconformity, check
+from uwbbench.tools.check.subject import ClassSubject
+from uwbbench.tools.check.values import Values
+
+CAPTURES, FRAMES = 12, 200
+_METRIC = "uwbbench.api.metric.Metric"
+
+
+def outcome(seed: int, *, missed: float = 0.1, false: float = 0.1, bias_m: float = 0.02, sd_m: float = 0.05) -> Outcome:
+    """Outcome of 200 frames, each with an object that is found or missed, and at most one false alarm."""
+    rng = np.random.default_rng(seed)
+    tp = (rng.uniform(size=FRAMES) >= missed).astype(np.int64)
+    fp = (rng.uniform(size=FRAMES) < false).astype(np.int64)
+    frame = np.repeat(np.arange(FRAMES), tp + fp)
+    first = np.concatenate([[True], np.diff(frame) > 0]) if len(frame) else np.empty(0, bool)
+    matched = first & (tp[frame] == 1)
+    return Outcome(
+        group=np.arange(FRAMES) // 50,
+        tp=tp,
+        fp=fp,
+        fn=1 - tp,
+        error_frame=frame,
+        error_m=np.where(matched, rng.normal(bias_m, sd_m, len(frame)), rng.uniform(0.3, 1.0, len(frame))),
+        matched=matched,
+        duration_s=FRAMES / 48.0,
+    )
+
+
+def perfect() -> Outcome:
+    """Outcome of a detector that finds everything, where it is, and nothing else."""
+    return outcome(0, missed=0.0, false=0.0, bias_m=0.0, sd_m=0.0)
+
+
+def empty() -> Outcome:
+    """Outcome of no frames."""
+    none, nothing = np.empty(0, np.int64), np.empty(0)
+    return Outcome(none, none, none, none, none, nothing, np.empty(0, bool), 0.0)
+
+
+class MetricSubject(ClassSubject):
+    """One metric, and outcomes of twelve captures."""
+
+    kind: ClassVar[Kind] = "metric"
+    base: ClassVar[type] = Metric
+
+    @cached_property
+    def outcomes(self) -> list[Outcome]:
+        """The usual outcomes."""
+        return [outcome(seed) for seed in range(1, CAPTURES + 1)]
+
+    def result(self) -> Values:
+        """Partials of all outcomes, and the value of all together."""
+        partials = [self.cls.partial(one) for one in self.outcomes]
+        value = np.array([self.cls.value(merge(self.cls, partials))])
+        return {**{f"partial {number}": np.asarray(part) for number, part in enumerate(partials)}, "value": value}
+
+    def input_arrays(self) -> Mapping[str, NDArray[Any]]:
+        """Arrays of the usual outcomes."""
+        return {
+            f"{name} of outcome {number}": value
+            for number, one in enumerate(self.outcomes)
+            for name, value in vars(one).items()
+            if isinstance(value, np.ndarray)
+        }
+
+    @property
+    def value(self) -> float:
+        """Value of all outcomes together."""
+        return float(self.usual["value"][0])
+
+
+@check(_METRIC)
+def attributes_are_valid(subject: MetricSubject) -> str:
+    """``merge`` and ``better`` are among the known words, and ``minimum_samples`` is a positive whole number."""
+    hints = get_type_hints(Metric)
+    for name in ("merge", "better"):
+        (choice,) = get_args(hints[name])
+        value = getattr(subject.cls, name)
+        if value not in get_args(choice):
+            raise Nonconformity(f"{name} among {', '.join(get_args(choice))}", repr(value))
+    least = subject.cls.minimum_samples
+    if not isinstance(least, int) or least < 1:
+        raise Nonconformity("minimum_samples of 1 or more", repr(least))
+    return f"{subject.cls.merge}, {subject.cls.better} is better"
+
+
+@check(_METRIC)
+def unit_is_given(subject: MetricSubject) -> str:
+    """A number that doubles or changes where all errors double has a unit, and says which."""
+    unit = subject.cls.unit
+    if not isinstance(unit, str):
+        raise Nonconformity("unit as text", repr(unit))
+    doubled = [dataclasses.replace(one, error_m=2 * one.error_m) for one in subject.outcomes]
+    changed = not math.isclose(evaluate(subject.cls, doubled), subject.value, rel_tol=1e-9)
+    if changed and not unit:
+        raise Nonconformity("a unit, such as 'm', as the value follows the errors", "unit = ''")
+    return unit or "a ratio without unit"
+
+
+@check(_METRIC)
+def partials_are_flat_arrays(subject: MetricSubject) -> None:
+    """A partial is a one-dimensional float array, of one length for all outcomes where partials are added."""
+    found = [subject.cls.partial(one) for one in subject.outcomes]
+    for part in found:
+        if not isinstance(part, np.ndarray) or part.ndim != 1 or part.dtype != np.float64:
+            told = f"{part.dtype} of shape {part.shape}" if isinstance(part, np.ndarray) else type(part).__name__
+            raise Nonconformity("float64 arrays of one dimension", told)
+    lengths = {len(part) for part in [*found, subject.cls.partial(empty())]}
+    if subject.cls.merge == "sum" and len(lengths) > 1:
+        raise Nonconformity("partials of one length", f"lengths {sorted(lengths)}")
+
+
+@check(_METRIC)
+def value_is_a_float(subject: MetricSubject) -> str:
+    """The value is a Python float: it goes into JSON and tables."""
+    value = subject.cls.value(merge(subject.cls, [subject.cls.partial(one) for one in subject.outcomes]))
+    if type(value) is not float:
+        raise Nonconformity("a float", type(value).__name__)
+    if not math.isfinite(value):
+        raise Nonconformity(f"a number for {CAPTURES * FRAMES} frames", str(value))
+    return f"{value:.4g} {subject.cls.unit}".rstrip()
+
+
+@check("uwbbench.measure.accuracy.stats.merge")
+def grouping_does_not_matter(subject: MetricSubject) -> None:
+    """Partials that are merged in any grouping and order give one value: runs are put together in pieces."""
+    cls = subject.cls
+    parts = [cls.partial(one) for one in subject.outcomes]
+    ways = {
+        "in reverse": parts[::-1],
+        "in two halves": [merge(cls, parts[:5]), merge(cls, parts[5:])],
+        "one after the other": [merge(cls, [merge(cls, [merge(cls, parts[:2]), parts[2]]), *parts[3:]])],
+        "with an empty capture": [*parts, cls.partial(empty())],
+    }
+    for name, pieces in ways.items():
+        value = cls.value(merge(cls, pieces))
+        if not math.isclose(value, subject.value, rel_tol=1e-9, abs_tol=1e-12):
+            raise Nonconformity(f"{subject.value!r} merged {name}", repr(value))
+
+
+@check("uwbbench.measure.accuracy.metrics")
+def nothing_is_undefined(subject: MetricSubject) -> None:
+    """Without frames the value is NaN with n = 0, no zero and no exception: 0/0 is undefined."""
+    found = bootstrap(subject.cls, [empty()], resamples=20)
+    value = subject.cls.value(subject.cls.partial(empty()))
+    if not math.isnan(value) or not math.isnan(found.value) or found.n:
+        raise Nonconformity("NaN with n = 0", f"{value} with n = {found.n}")
+
+
+@check(_METRIC)
+def perfection_is_best(subject: MetricSubject) -> str:
+    """A perfect detector gets a number, and none that misses, invents or errs gets a better one; ``better`` says how.
+
+    At least one of those must get a worse one.
+    """
+    cls = subject.cls
+    best = evaluate(cls, [perfect()])
+    spoiled = {"misses half": {"missed": 0.5}, "invents": {"false": 0.5}, "errs": {"bias_m": 0.3, "sd_m": 0.2}}
+    flaws = {name: {"missed": 0.0, "false": 0.0, "bias_m": 0.0, "sd_m": 0.0, **how} for name, how in spoiled.items()}
+    others = {name: evaluate(cls, [outcome(1, **how)]) for name, how in flaws.items()}
+    if not math.isfinite(best):
+        raise Nonconformity("a number for a perfect detector", str(best))
+    beaten = {name: _merit(cls, best) - _merit(cls, value) for name, value in others.items()}
+    wrong = next((name for name, lead in beaten.items() if lead < -1e-12), None)
+    if wrong:
+        told = f"perfect {best:g}, one that {wrong} {others[wrong]:g}, and {cls.better} is better"
+        raise Nonconformity("no flawed detector above the perfect one", told)
+    if not any(lead > 0 for lead in beaten.values()):
+        raise Nonconformity("a worse value for some flaw", f"{best:g} for all of {', '.join(others)}")
+    return f"perfect: {best:g}"
+
+
+def _merit(cls: type[Metric], value: float) -> float:
+    """Larger for what is better."""
+    return {"higher": value, "lower": -value, "zero": -abs(value)}[cls.better]
+
+
+@check("uwbbench.measure.accuracy.stats.bootstrap")
+def interval_brackets_the_value(subject: MetricSubject) -> str:
+    """The bootstrap interval over twelve captures is finite and holds the value."""
+    found = bootstrap(subject.cls, subject.outcomes, resamples=300)
+    if not found.low <= found.value <= found.high:
+        raise Nonconformity(f"an interval around {found.value:g}", f"{found.low:g} to {found.high:g}")
+    return f"{found.value:.4g} in {found.low:.4g} to {found.high:.4g}, n = {found.n}"
+
+
+@check("uwbbench.api.metric.Metric.resampled")
+def resampling_is_the_same_number(subject: MetricSubject) -> None:
+    """A faster way to resample gives what merging the drawn partials gives."""
+    cls = subject.cls
+    partials = [cls.partial(one) for one in subject.outcomes]
+    counts = np.random.default_rng(7).multinomial(CAPTURES, [1 / CAPTURES] * CAPTURES, size=20)
+    fast = np.asarray(cls.resampled(partials, counts))
+    plain = Metric.resampled.__func__(cls, partials, counts)  # type: ignore[attr-defined]
+    if fast.shape != plain.shape or not np.allclose(fast, plain, rtol=1e-9, atol=1e-12, equal_nan=True):
+        worst = float(np.nanmax(np.abs(fast - plain))) if fast.shape == plain.shape else math.nan
+        raise Nonconformity("the values of merged partials", f"shape {fast.shape}, differences up to {worst:g}")
+
+
+@check("uwbbench.api.metric.Outcome")
+def errors_that_are_nan_are_left_out(subject: MetricSubject) -> None:
+    """Detections that belong to no object have the error NaN, which must not make the value NaN."""
+    spoiled = []
+    for one in subject.outcomes:
+        error_m = one.error_m.copy()
+        error_m[::10] = np.nan
+        spoiled.append(dataclasses.replace(one, error_m=error_m))
+    if not math.isfinite(evaluate(subject.cls, spoiled)):
+        raise Nonconformity("a number from the other errors", str(evaluate(subject.cls, spoiled)))
+
+
+@check("uwbbench.api.metric.Outcome")
+def open_truth_is_fine(subject: MetricSubject) -> str:
+    """Captures whose truth is not exhaustive come through; what an unmatched detection would decide is undefined."""
+    value = evaluate(subject.cls, [dataclasses.replace(one, exhaustive=False) for one in subject.outcomes])
+    return f"{value:.4g}"
+
+
+CHECKS = (
+    attributes_are_valid,
+    unit_is_given,
+    partials_are_flat_arrays,
+    value_is_a_float,
+    grouping_does_not_matter,
+    nothing_is_undefined,
+    perfection_is_best,
+    interval_brackets_the_value,
+    resampling_is_the_same_number,
+    errors_that_are_nan_are_left_out,
+    open_truth_is_fine,
+)

@@ -1,0 +1,130 @@
+"""Checks of a stage as a stream: the same for any cut, after a new start, and beside another instance."""
+
+from __future__ import annotations
+
+import statistics
+import time
+from typing import Any
+
+import numpy as np
+
+from uwbbench.api import registry
+from uwbbench.api.stage import Stage
+from uwbbench.tools.check.check import Nonconformity, NotApplicable, check
+from uwbbench.tools.check.inputs import CUTS, cut, pieces
+from uwbbench.tools.check.stage_subject import StageSubject
+from uwbbench.tools.check.values import Values, of_blocks, same
+
+CALLS = 60
+_STAGE = "uwbbench.api.stage.Stage"
+
+
+@check(_STAGE)
+def stream_equals_batch(subject: StageSubject) -> str:
+    """Any cut into blocks gives the same bits: keep what lies between blocks on the instance, and start it in open."""
+    for name, cuts in CUTS.items():
+        same(subject.usual, subject.run(subject.block, cuts), f"in {name} what the whole block gives")
+    return f"{len(CUTS)} cuts"
+
+
+@check("uwbbench.api.stage.Stage.open")
+def open_starts_anew(subject: StageSubject) -> None:
+    """An instance that is opened again gives what a fresh one gives: ``open`` resets all state."""
+    stage = subject.opened()
+    subject.run(subject.block, stage=stage)
+    subject.reopen(stage)
+    same(subject.usual, subject.run(subject.block, stage=stage), "after open what a fresh instance gives")
+
+
+@check("uwbbench.api.stage.Stage.open")
+def instances_share_nothing(subject: StageSubject) -> None:
+    """Two instances that are stepped by turns give what each alone gives: no state on the class or the module."""
+    blocks = pieces(subject.block, CUTS["blocks of 7"])
+    one, other = subject.opened(), subject.opened()
+    yielded = []
+    for block in blocks:
+        yielded.append(one.step(block))
+        other.step(cut(block, 0, len(block.frames) // 2))
+    tail = one.flush()
+    found: Values = of_blocks([*yielded, *([] if tail is None else [tail])])
+    same(subject.usual, found, "beside another instance the same result")
+
+
+@check("uwbbench.api.stage.Stage.note")
+def notes_come_from_note(subject: StageSubject) -> str:
+    """Notes are told by ``note``, each once, the same for any cut, and are gone after ``open``."""
+    stage = subject.opened()
+    subject.run(subject.block, stage=stage)
+    whole = list(stage.notes)
+    if not all(isinstance(note, str) for note in whole) or len(set(whole)) < len(whole):
+        raise Nonconformity("texts, each once", repr(whole))
+    subject.reopen(stage)
+    at_start = list(stage.notes)
+    subject.run(subject.block, CUTS["single frames"], stage=stage)
+    if stage.notes != whole:
+        raise Nonconformity(f"the same notes for single frames: {whole}", str(stage.notes))
+    if at_start != subject.opened().notes:
+        raise Nonconformity("no notes of the stream before", str(at_start))
+    return f"{len(whole)} notes"
+
+
+@check("uwbbench.measure.latency")
+def one_frame_is_in_time(subject: StageSubject) -> str:
+    """A call for one frame takes less than the radar's frame period, or the stage cannot keep up.
+
+    The number is rough; ``uwbbench time`` measures properly.
+    """
+    own_s, period_s = _call_s(subject.opened(), subject), 1 / subject.capture.radar.frame_rate_hz
+    told = f"{own_s * 1e6:.0f} us a call"
+    if "reference.nothing" in registry.entries("stages"):
+        nothing = StageSubject("reference.nothing").opened()
+        told += f", {own_s / _call_s(nothing, subject):.1f} times doing nothing"
+    if own_s > period_s:
+        raise Nonconformity(f"a call for one frame within {period_s * 1e3:.1f} ms", told)
+    return told
+
+
+def _call_s(stage: Stage[Any], subject: StageSubject) -> float:
+    """Median time of a call for one frame."""
+    blocks = pieces(subject.block, CUTS["single frames"])[:CALLS]
+    times = []
+    for block in blocks:
+        start = time.perf_counter()
+        stage.step(block)
+        times.append(time.perf_counter() - start)
+    return statistics.median(times[len(times) // 3 :])  # the first calls load and compile
+
+
+@check(_STAGE)
+def no_rows_are_fine(subject: StageSubject) -> None:
+    """Frames without any detection come through: most frames of an empty room hold none."""
+    if "detections" not in subject.cls.consumes:
+        raise NotApplicable("the stage consumes no detections")
+    nothing = subject.block.detections.take(np.empty(0, np.int64))
+    found = subject.run(subject.block.replace(detections=nothing), CUTS["blocks of 7"])
+    if len(found["detections"]):
+        raise Nonconformity("no detections", f"{len(found['detections'])}")
+    missing = sorted(subject.cls.produces - found.keys())
+    if missing:
+        raise Nonconformity("the declared columns, empty", f"no {', '.join(missing)}")
+
+
+@check(_STAGE)
+def no_frames_are_fine(subject: StageSubject) -> None:
+    """A block without frames comes through, as does a stream without blocks: a capture may be empty."""
+    empty = cut(subject.block, 0, 0)
+    found = subject.run(empty)
+    if len(found["detections"]) or len(found["frame index"]):
+        raise Nonconformity("nothing", f"{len(found['detections'])} detections in {len(found['frame index'])} frames")
+    subject.opened().flush()
+
+
+CHECKS = (
+    stream_equals_batch,
+    open_starts_anew,
+    instances_share_nothing,
+    no_frames_are_fine,
+    no_rows_are_fine,
+    notes_come_from_note,
+    one_frame_is_in_time,
+)

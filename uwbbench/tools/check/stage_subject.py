@@ -1,0 +1,188 @@
+"""A stage under examination, behind a chain that makes all that it consumes."""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from uwbbench.api import registry
+from uwbbench.api.block import Block
+from uwbbench.api.capture import Capture
+from uwbbench.api.detections import Detections
+from uwbbench.api.errors import UwbbenchError
+from uwbbench.api.stage import Stage
+from uwbbench.tools.check.check import Kind, Nonconformity, NotApplicable
+from uwbbench.tools.check.inputs import frames_of, pieces, usual_capture
+from uwbbench.tools.check.params import working_params
+from uwbbench.tools.check.subject import ClassSubject
+from uwbbench.tools.check.values import Values, of_blocks
+
+STANDARD = (
+    "noise_floor",
+    "profile.minmax",
+    "first_path.crest",
+    "peaks",
+    "score.snr",
+    "pdoa",
+    "azimuth",
+    "range",
+    "position",
+)
+"""Stages that make all the usual ports, in order."""
+
+PARTS = {"first_path": "first_path", "noise": "noise_rms", "profile": "profile"}
+"""Attribute of a block behind each port that is one."""
+
+
+class StageSubject(ClassSubject):
+    """One stage, and the usual block that it is given."""
+
+    kind: ClassVar[Kind] = "stage"
+    base: ClassVar[type] = Stage
+
+    @cached_property
+    def params(self) -> Any:
+        """Parameters that it is examined with."""
+        return working_params(self.cls.params_type(), self.given, f"stage '{self.name}'", self.name)
+
+    @property
+    def capture(self) -> Capture:
+        """The usual capture."""
+        return usual_capture()
+
+    def opened(self, capture: Capture | None = None) -> Stage[Any]:
+        """A fresh instance at the start of a stream."""
+        capture = capture or self.capture
+        stage: Stage[Any] = self.cls(self.params)
+        self.reopen(stage, capture)
+        return stage
+
+    def reopen(self, stage: Stage[Any], capture: Capture | None = None) -> None:
+        """Start a stream as a pipeline does."""
+        capture = capture or self.capture
+        stage.open(capture.radar)
+        if "truth" in self.cls.needs and capture.truth is not None:
+            stage.show_truth(capture.truth, capture.trajectory)
+
+    @cached_property
+    def full_block(self) -> Block:
+        """The usual capture behind all usual stages, and those that make what this one consumes besides."""
+        return behind_all(self.capture, self.cls.consumes)
+
+    @cached_property
+    def block(self) -> Block:
+        """The full block with nothing but what this stage declares that it consumes."""
+        return self.declared(self.full_block)
+
+    def declared(self, block: Block) -> Block:
+        """Block with nothing but what this stage declares that it consumes and needs."""
+        return declared_parts(block, self.cls.consumes, self.cls.needs)
+
+    def run(self, block: Block, cuts: Sequence[int] = (), stage: Stage[Any] | None = None) -> Values:
+        """What the stage yields for a block handed over in pieces, the flush included."""
+        stage = stage or self.opened()
+        yielded = [stage.step(piece) for piece in pieces(block, cuts)]
+        tail = stage.flush()
+        return of_blocks([*yielded, *([] if tail is None else [tail])])
+
+    def result(self) -> Values:
+        """What a fresh instance makes of the usual block."""
+        return self.run(self.block)
+
+    def input_arrays(self) -> Mapping[str, NDArray[Any]]:
+        """Arrays of the usual block."""
+        block = self.block
+        arrays = {f"frames.{name}": value for name, value in vars(block.frames).items()}
+        arrays |= {name: getattr(block, name) for name in PARTS.values()}
+        arrays |= {f"detections.{name}": column for name, column in block.detections.columns.items()}
+        return {name: value for name, value in arrays.items() if isinstance(value, np.ndarray)}
+
+    @property
+    def adds(self) -> frozenset[str]:
+        """Names, as :func:`uwbbench.tools.check.values.of_blocks` gives them, of what this stage answers for."""
+        kept: frozenset[str] = self.cls.consumes & {"detections"}
+        produced: frozenset[str] = self.cls.produces
+        return produced | kept
+
+
+def declared_parts(block: Block, consumes: frozenset[str], needs: frozenset[str]) -> Block:
+    """Block without the parts, columns and reported values that are not among these."""
+    columns: dict[str, Any] = {n: v for n, v in block.detections.columns.items() if n == "frame" or n in consumes}
+    frame = columns.pop("frame")
+    found = Detections.empty(block.frames.index)
+    if "detections" in consumes:
+        found = Detections(frame, processed=block.frames.index, **columns)
+    parts: dict[str, Any] = {PARTS[port]: None for port in PARTS.keys() - consumes}
+    absent = [name for name in ("sts1", "sts2") if "sts" not in needs]
+    absent += [name for name in vars(block.frames) if name.startswith("first_path") and "first_path" not in needs]
+    frames = _without(block, absent).frames
+    return block.replace(frames=frames, detections=found, **parts)
+
+
+def lacking(block: Block, port: str) -> Block:
+    """Block in which one port is gone; samples, which are always there, are replaced by others."""
+    if port == "frames":
+        frames = block.frames.with_preamble(np.ascontiguousarray(block.frames.preamble[:, ::-1]))
+        return block.replace(frames=frames)
+    if port in PARTS:
+        return block.replace(**{PARTS[port]: None})
+    if port == "detections":
+        return block.replace(detections=Detections.empty(block.frames.index))
+    if port == "STS responses":
+        return _without(block, ["sts1", "sts2"])
+    if port == "reported first path":
+        return _without(block, [name for name in vars(block.frames) if name.startswith("first_path")])
+    columns: dict[str, Any] = {name: values for name, values in block.detections.columns.items() if name != port}
+    return block.replace(detections=Detections(**columns, processed=block.detections.processed))
+
+
+def _without(block: Block, names: Sequence[str]) -> Block:
+    absent: dict[str, Any] = dict.fromkeys(names)
+    return block.replace(frames=dataclasses.replace(block.frames, **absent))
+
+
+def behind_all(capture: Capture, consumes: frozenset[str]) -> Block:
+    """All frames of a capture behind the usual stages, and behind those that make other ports that are consumed.
+
+    Raises
+    ------
+    Nonconformity
+        If no installed stage makes one of them.
+    """
+    block = Block(frames_of(capture))
+    made = frozenset({"frames"})
+    for name in STANDARD:
+        if name in registry.entries("stages"):
+            block, made = _through(name, block, made, capture)
+    for port in sorted(consumes - made):
+        block, made = _with_port(port, block, made, capture)
+    return block
+
+
+def _with_port(port: str, block: Block, made: frozenset[str], capture: Capture) -> tuple[Block, frozenset[str]]:
+    for name in registry.entries("stages"):
+        with contextlib.suppress(UwbbenchError, NotApplicable):  # another stage may make it
+            if port in registry.load_plugin("stages", name).produces:
+                behind, known = _through(name, block, made, capture)
+                if port in known:
+                    return behind, known
+    raise Nonconformity("ports that an installed stage makes", f"none that makes '{port}' from the usual ports")
+
+
+def _through(name: str, block: Block, made: frozenset[str], capture: Capture) -> tuple[Block, frozenset[str]]:
+    """Block behind one stage, where the capture and the block have all that it takes; else as before."""
+    cls = registry.load_plugin("stages", name)
+    lacks_sts = "sts" in cls.needs and not capture.radar.has_sts
+    if lacks_sts or "truth" in cls.needs or cls.consumes - made:
+        return block, made
+    stage: Stage[Any] = cls(working_params(cls.params_type(), {}, f"stage '{name}'", name))
+    stage.open(capture.radar)
+    parts = [stage.step(block)]
+    tail = stage.flush()
+    return Block.join([*parts, *([] if tail is None else [tail])]), made | cls.produces

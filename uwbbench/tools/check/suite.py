@@ -1,0 +1,193 @@
+"""All checks of each kind of plugin, put to one of them."""
+
+from __future__ import annotations
+
+import unittest
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from uwbbench.api import registry
+from uwbbench.api.errors import ConfigError, PluginError, nearest
+from uwbbench.api.locate import shipped
+from uwbbench.tools.check import (
+    conduct,
+    dataset,
+    declaration,
+    detector,
+    detector_cases,
+    metric,
+    source,
+    stage_inputs,
+    stage_ports,
+    stage_stream,
+)
+from uwbbench.tools.check.check import KINDS, Check, Kind, Result
+from uwbbench.tools.check.dataset import DatasetSubject
+from uwbbench.tools.check.detector import DetectorSubject
+from uwbbench.tools.check.metric import MetricSubject
+from uwbbench.tools.check.stage_subject import StageSubject
+from uwbbench.tools.check.subject import Subject
+
+_SUBJECTS: dict[Kind, type[Subject]] = {
+    "stage": StageSubject,
+    "detector": DetectorSubject,
+    "dataset": DatasetSubject,
+    "metric": MetricSubject,
+}
+_CHECKS: dict[Kind, tuple[Check, ...]] = {
+    "stage": (
+        *declaration.CHECKS,
+        declaration.origin_is_stated,
+        *source.CHECKS,
+        *stage_ports.CHECKS,
+        *stage_stream.CHECKS,
+        *conduct.CHECKS,
+        *stage_inputs.CHECKS,
+    ),
+    "detector": (*detector.CHECKS, *conduct.CHECKS, *detector_cases.CHECKS),
+    "dataset": (*declaration.CHECKS, *source.CHECKS, *dataset.CHECKS, *conduct.CHECKS),
+    "metric": (declaration.docstring_says_what_it_is, *source.CHECKS, *metric.CHECKS, *conduct.CHECKS),
+}
+
+
+@dataclass(frozen=True)
+class Conformance:
+    """How one plugin stood the checks of its kind.
+
+    Attributes
+    ----------
+    kind, name : str
+    results : tuple of Result
+    """
+
+    kind: Kind
+    name: str
+    results: tuple[Result, ...]
+
+    @property
+    def passed(self) -> bool:
+        """Whether no check failed, and none was broken by the plugin."""
+        return all(result.passed for result in self.results)
+
+    def count(self, status: str) -> int:
+        """Checks with this status."""
+        return sum(result.status == status for result in self.results)
+
+    def to_dict(self) -> dict[str, Any]:
+        """All results as plain values, for JSON."""
+        statuses = ("passed", "failed", "error", "not applicable")
+        counts = {status.replace(" ", "_"): self.count(status) for status in statuses}
+        about = {"kind": self.kind, "name": self.name}
+        return {**about, **counts, "checks": [result.to_dict() for result in self.results]}
+
+
+def all_checks(kind: Kind) -> tuple[Check, ...]:
+    """Every check that a kind of plugin is put to, in order."""
+    return _CHECKS[kind]
+
+
+def kinds_of(name: str) -> tuple[Kind, ...]:
+    """Kinds of plugin that bear a name; a path of a YAML file is a detector.
+
+    Raises
+    ------
+    PluginError
+        If none does.
+    """
+    if name.endswith((".yaml", ".yml")):
+        return ("detector",)
+    known = {kind: list(registry.entries(f"{kind}s")) for kind in KINDS}
+    known["detector"] += shipped("detectors")
+    found = tuple(kind for kind in KINDS if name in known[kind])
+    if not found:
+        every = [other for names in known.values() for other in names]
+        raise PluginError(f"no stage, detector, dataset or metric named '{name}'.{nearest(name, every)}")
+    return found
+
+
+def subject_of(kind: Kind, name: str, params: Mapping[str, Any] | None = None, roots: Sequence[Path] = ()) -> Subject:
+    """Plugin to be examined.
+
+    Raises
+    ------
+    PluginError, ConfigError
+        If it is unknown or cannot be loaded.
+    """
+    return _SUBJECTS[kind](name, params, tuple(roots))
+
+
+def examine(subject: Subject, names: Sequence[str] | None = None) -> Conformance:
+    """Put the checks of its kind to a plugin.
+
+    Parameters
+    ----------
+    subject : Subject
+    names : sequence of str, optional
+        Only these checks.
+
+    Raises
+    ------
+    ConfigError
+        If there is no check of such a name.
+    """
+    known = {one.name: one for one in all_checks(subject.kind)}
+    for name in names or ():
+        if name not in known:
+            raise ConfigError(f"no check of {subject.kind}s is named '{name}'.{nearest(name, known)}")
+    chosen = known.values() if names is None else [known[name] for name in names]
+    return Conformance(subject.kind, subject.name, tuple(one.judge(subject) for one in chosen))
+
+
+def checks_for(
+    kind: Kind, name: str, params: Mapping[str, Any] | None = None, roots: Sequence[Path] = ()
+) -> list[tuple[str, Callable[[], None]]]:
+    """Checks of a plugin as tests: pairs of a name and a function to call.
+
+    Parameters
+    ----------
+    kind : {"stage", "detector", "dataset", "metric"}
+    name : str
+        Registered name.
+    params : mapping, optional
+        Parameters to examine it with, where the defaults will not do.
+    roots : sequence of Path
+        Folders that a dataset searches.
+
+    Returns
+    -------
+    list of (str, callable)
+        A function raises AssertionError with an explanation where the check fails, and ``unittest.SkipTest``, which
+        pytest understands, where it does not apply.
+
+    Raises
+    ------
+    PluginError, ConfigError
+        If the plugin is unknown or cannot be loaded.
+
+    Examples
+    --------
+    >>> checks = dict(checks_for("metric", "recall"))
+    >>> checks["unit-is-given"]()
+    """
+    subject = subject_of(kind, name, params, roots)
+    return [(one.name, partial(assert_conforms, one, subject)) for one in all_checks(kind)]
+
+
+def assert_conforms(one: Check, subject: Subject) -> None:
+    """Put one check to a plugin, as a test does.
+
+    Raises
+    ------
+    AssertionError
+        If it fails; the message explains.
+    unittest.SkipTest
+        If it does not apply.
+    """
+    result = one.judge(subject)
+    if result.status == "not applicable":
+        raise unittest.SkipTest(f"{one.name}: {result.detail}")
+    if not result.passed:
+        raise AssertionError(f"{subject.kind} '{subject.name}': {result.explain()}\n{result.trace}".rstrip())

@@ -1,0 +1,175 @@
+"""Accuracy: metrics of the head on whole captures, against fixed limits or against a stored run.
+
+Conventions
+-----------
+* A fixed limit is held against the value on these captures, which a deterministic detector gives again and again; the
+  interval beside it tells how far other captures may lie.
+* Against a stored run, the difference on the same captures counts, in pairs
+  (:func:`uwbbench.measure.accuracy.stats.paired_difference`): a regression is a loss whose whole interval lies beyond
+  the tolerance. Both are judged by the gate's own rules, and captures are recognised by their content.
+* Captures of one dataset are pooled, those of different datasets never.
+"""
+
+from __future__ import annotations
+
+import math
+import tempfile
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from uwbbench.api import registry
+from uwbbench.api.capture import Capture
+from uwbbench.api.detections import Detections
+from uwbbench.api.errors import ScoringError
+from uwbbench.api.metric import Outcome
+from uwbbench.config.source import CaptureRef
+from uwbbench.measure.accuracy.scoring import Region, ScoringRules, outcomes
+from uwbbench.measure.accuracy.stats import MINIMUM_GROUPS, Estimate, bootstrap, paired_difference
+from uwbbench.run.folder.tables import read_detections
+from uwbbench.show.text.wording import TITLES
+from uwbbench.tools.gate.check import Check, Verdict
+from uwbbench.tools.gate.config import AccuracyModel, Gate
+from uwbbench.tools.gate.link import SetUpError, Worker, detect
+from uwbbench.tools.gate.stored import StoredRun
+
+
+@dataclass(frozen=True)
+class Found:
+    """What the head found on a capture.
+
+    Attributes
+    ----------
+    capture : Capture
+    sha256 : str
+        Of its content.
+    detections : Detections
+    """
+
+    capture: Capture
+    sha256: str
+    detections: Detections
+
+
+def found_on(gate: Gate, worker: Worker, ref: CaptureRef) -> Found:
+    """Run the head on a capture.
+
+    Raises
+    ------
+    SetUpError
+        If it cannot be run, or its environment reads another content.
+    """
+    candidates = any(rule.scoring == "peak" for rule in gate.model.accuracy)
+    capture = ref.open()
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "found.parquet"
+        answer = detect(worker, gate.head, ref, candidates=candidates, to=path)
+        before_filters = path.with_suffix(".candidates.parquet")
+        found = read_detections(path, before_filters if candidates else None)
+    if answer["sha256"] != capture.sha256:
+        raise SetUpError(f"capture '{ref.name}' has another content in the environment of the head")
+    return Found(capture, capture.sha256, found)
+
+
+def accuracy_check(gate: Gate, rule: AccuracyModel, label: str, found: list[Found]) -> Check:
+    """One limit on one dataset.
+
+    Raises
+    ------
+    ScoringError, StoreError, ConfigError
+        If nothing can be said: there is no truth, or the stored run is not what it should be.
+    """
+    source = ", SIMULATED" if any(one.capture.source == "simulated" for one in found) else ""
+    title = TITLES.get(rule.metric, rule.metric)
+    name = f"{title} ({rule.scoring} scoring, {rule.table}) on {label}{source}"
+    metric = registry.load_plugin("metrics", rule.metric)
+    blank = Check(kind="accuracy", name=name, verdict=Verdict.INVALID, quantity=title, unit=metric.unit)
+    outcome = partial(_outcome, gate, rule)
+    mine = [outcome(one.capture, one.detections) for one in found]
+    settings = {**gate.model.intervals.model_dump(), "seed": gate.model.seed}
+    if rule.no_worse_than is None:
+        return _limited(blank, rule, bootstrap(metric, mine, **settings))
+    head_name = _name_of(gate)
+    stored = StoredRun(gate.folder / rule.no_worse_than, rule.detector, head_name)
+    theirs = [outcome(one.capture, stored.detections(one.capture.name, one.sha256)) for one in found]
+    check = replace(blank, name=f"{name}, against {stored.detector} of {rule.no_worse_than}")
+    return _compared(check, rule, metric.better, paired_difference(metric, mine, theirs, **settings))
+
+
+def _name_of(gate: Gate) -> str:
+    """Name under which a run would store the head."""
+    from uwbbench.config.detector import read_detector
+
+    if gate.head.python is not None:
+        return Path(gate.head.detector).stem
+    return read_detector(gate.head.detector, None, gate.head.set).name
+
+
+def _outcome(gate: Gate, rule: AccuracyModel, capture: Capture, found: Detections) -> Outcome:
+    region = gate.model.region
+    where = Region(region.min_range_m, region.max_range_m, region.half_angle_rad)
+    tables = outcomes(found, capture.header, ScoringRules(rule.scoring, gate.model.gate_m, where, gate.model.strongest))
+    if rule.table not in tables:
+        raise ScoringError(f"capture '{capture.name}': nothing after mapping: the detector does not cluster positions")
+    return tables[rule.table]
+
+
+def _limited(check: Check, rule: AccuracyModel, found: Estimate) -> Check:
+    """A value against a fixed limit."""
+    bound: Any = "minimum" if rule.maximum is None else "maximum"
+    limit = rule.minimum if rule.maximum is None else rule.maximum
+    assert limit is not None  # noqa: S101 - the model has made sure
+    check = replace(_with(check, found), limit=limit, bound=bound)
+    if math.isnan(found.value):
+        return _undefined(check, found)
+    kept = found.value >= limit if bound == "minimum" else found.value <= limit
+    if kept:
+        return replace(check, verdict=Verdict.PASS)
+    advice = "see which frames are lost with 'uwbbench plot', or state another limit"
+    return replace(check, verdict=Verdict.REGRESSION, reason="beyond the limit", advice=advice)
+
+
+def _compared(check: Check, rule: AccuracyModel, better: str, found: Estimate) -> Check:
+    """A difference, head minus stored run, against no loss at all, or the tolerated one."""
+    sign = 1.0 if better == "higher" else -1.0
+    bound: Any = "minimum" if better == "higher" else "maximum"
+    check = replace(
+        _with(check, found), quantity=f"{check.quantity} difference", limit=-sign * rule.tolerance, bound=bound
+    )
+    if math.isnan(found.value):
+        return _undefined(check, found)
+    if -sign * found.value <= rule.tolerance:
+        return replace(check, verdict=Verdict.PASS)
+    if math.isnan(found.low):
+        return replace(
+            check,
+            verdict=Verdict.INCONCLUSIVE,
+            reason=f"worse, but {found.groups} groups are too few for an interval",
+            advice=f"gate on {MINIMUM_GROUPS} captures, or seconds of one, or more; or allow a tolerance",
+        )
+    least_loss = -found.high if better == "higher" else found.low
+    if least_loss <= rule.tolerance:
+        return replace(check, verdict=Verdict.PASS, reason="worse, but within the interval")
+    return replace(
+        check,
+        verdict=Verdict.REGRESSION,
+        reason="worse by more than the interval",
+        advice="compare with the stored run",
+    )
+
+
+def _with(check: Check, found: Estimate) -> Check:
+    """Check with a value, its interval and what is behind it."""
+    value, low, high = (None if math.isnan(part) else part for part in (found.value, found.low, found.high))
+    counted = f"{'errors' if check.unit == 'm' else 'frames'} in {found.groups} groups"
+    return replace(check, value=value, low=low, high=high, n=found.n, counted=counted)
+
+
+def _undefined(check: Check, found: Estimate) -> Check:
+    """Check of a number that is undefined: too few samples can be helped by more, none at all cannot."""
+    if found.n:
+        reason = f"{found.n} samples are too few"
+        return replace(check, verdict=Verdict.INCONCLUSIVE, reason=reason, advice="gate on more or longer captures")
+    reason = "undefined: nothing was retained, nothing was to be found, or the truth is not exhaustive"
+    return replace(check, reason=reason, advice="see the same numbers with 'uwbbench score'")

@@ -1,0 +1,113 @@
+"""Carrying out a gate: every check in turn; one that cannot be made is a verdict too."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
+from time import perf_counter
+
+from uwbbench.api.errors import UwbbenchError
+from uwbbench.config.source import CaptureRef
+from uwbbench.measure.latency.machine import machine
+from uwbbench.run.plan import reason_of
+from uwbbench.tools.gate.accuracy import Found, accuracy_check, found_on
+from uwbbench.tools.gate.check import Check, Kind, Result, Verdict
+from uwbbench.tools.gate.config import AccuracyModel, Captures, Gate
+from uwbbench.tools.gate.deadline import deadline_checks
+from uwbbench.tools.gate.latency import latency_checks
+from uwbbench.tools.gate.link import worker_of
+
+Told = Callable[[str], None]
+Listed = Mapping[str, Sequence[CaptureRef]]
+
+
+def run_gate(gate: Gate, tell: Told = lambda _: None) -> Result:
+    """Make all checks of a gate: accuracy, deadlines, then speed against the base.
+
+    Parameters
+    ----------
+    gate : Gate
+    tell : callable
+        Told what is being done.
+
+    Returns
+    -------
+    Result
+        What could not be measured is a check with the verdict ``invalid``.
+    """
+    checks: list[Check] = []
+    listed = _listed(gate, checks)
+    model = gate.model
+    for label, refs in listed.items():
+        checks += _accuracy(gate, label, refs, tell)
+    if model.deadline is not None:
+        deadline = model.deadline
+        for label, ref in _timed(listed, deadline.captures):
+            tell(f"deadlines on {label}")
+            checks += _made("deadline", label, partial(deadline_checks, gate, deadline, label, ref))
+    if model.latency is not None and gate.base is not None:
+        latency, base = model.latency, gate.base
+        for label, ref in _timed(listed, latency.captures):
+            checks += _made("latency", label, partial(latency_checks, gate, base, latency, label, ref, tell))
+    return Result(gate.name, gate.head.text, "" if gate.base is None else gate.base.text, tuple(checks), machine())
+
+
+def _listed(gate: Gate, checks: list[Check]) -> dict[str, list[CaptureRef]]:
+    """Captures of each dataset; one that cannot list them becomes a check."""
+    listed = {}
+    for source in gate.datasets:
+        try:
+            listed[source.label] = source.references()
+        except Exception as error:  # noqa: BLE001 - an adapter may raise anything; the other datasets still count
+            checks.append(_invalid("captures", source.label, reason_of(error)))
+    return listed
+
+
+def _timed(listed: Listed, captures: Captures) -> list[tuple[str, CaptureRef]]:
+    """Captures that are timed, each with a name for people."""
+    return [
+        (f"{label}, {ref.name}", ref)
+        for label, refs in listed.items()
+        for ref in (refs if captures == "all" else refs[:1])
+    ]
+
+
+def _accuracy(gate: Gate, label: str, refs: Sequence[CaptureRef], tell: Told) -> list[Check]:
+    """All limits of one dataset."""
+    rules = [rule for rule in gate.model.accuracy if rule.dataset in (None, label)]
+    if not rules:
+        return []
+    tell(f"accuracy on {label}")
+    started = perf_counter()
+    try:
+        with worker_of(gate.head, gate.model.timeout_s) as worker:
+            found = [found_on(gate, worker, ref) for ref in refs]
+    except UwbbenchError as error:
+        return [
+            _invalid("accuracy", f"{rule.metric} ({rule.scoring} scoring) on {label}", str(error)) for rule in rules
+        ]
+    checks: list[Check] = []
+    for rule in rules:
+        name = f"{rule.metric} ({rule.scoring} scoring) on {label}"
+        checks += _made("accuracy", name, partial(_one_accuracy, gate, rule, label, found))
+    return [replace(check, elapsed_s=(perf_counter() - started) / len(checks)) for check in checks]
+
+
+def _one_accuracy(gate: Gate, rule: AccuracyModel, label: str, found: list[Found]) -> list[Check]:
+    return [accuracy_check(gate, rule, label, found)]
+
+
+def _made(kind: Kind, name: str, make: Callable[[], list[Check]]) -> list[Check]:
+    """Checks with the time that they took."""
+    started = perf_counter()
+    try:
+        checks = make()
+    except UwbbenchError as error:
+        checks = [_invalid(kind, name, str(error))]
+    return [replace(check, elapsed_s=(perf_counter() - started) / len(checks)) for check in checks]
+
+
+def _invalid(kind: Kind, name: str, reason: str) -> Check:
+    advice = "repair what the reason names; nothing was measured"
+    return Check(kind=kind, name=f"{kind} of {name}", verdict=Verdict.INVALID, reason=reason, advice=advice)

@@ -1,0 +1,115 @@
+"""The process that runs detectors for a gate: one request a line on standard input, one answer a line, both JSON.
+
+Run as ``python -m uwbbench.tools.gate.worker``, by the interpreter of the environment that the detector lives in, which
+may hold another version of uwbbench than the gate's. Requests name what to do (``do``); see the functions below. An
+answer with the key ``error`` is a message for the user, and the process goes on; anything unexpected ends it.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from uwbbench.api.capture import Capture
+    from uwbbench.tools.gate.player import Player
+
+PROTOCOL = 2
+"""Raised whenever requests or answers change their meaning: only equal numbers understand each other."""
+
+
+class Session:
+    """What a worker knows: its players by name."""
+
+    def __init__(self) -> None:
+        self._players: dict[str, Player] = {}
+
+    def join(
+        self, player: str, detector: dict[str, Any], capture: dict[str, Any], frames: int, windows: int
+    ) -> dict[str, Any]:
+        """Load a detector and frames of a capture, and warm up."""
+        from uwbbench.tools.gate.player import Player
+
+        opened = _opened(capture)
+        joined = Player(_loaded(detector), opened, frames)
+        self._players[player] = joined
+        return {
+            "call_s": joined.warm_up(windows),
+            "frames": len(joined.whole),
+            "content": joined.content,
+            "frame_rate_hz": opened.radar.frame_rate_hz,
+            "source": opened.source,
+        }
+
+    def turn(self, player: str, size: int) -> dict[str, Any]:
+        """Time of the player's next frames."""
+        return {"spent_s": self._players[player].turn(size)}
+
+    def blocks(self, base: str, head: str, size: int, count: int) -> dict[str, Any]:
+        """Log ratios of two players of this process."""
+        from uwbbench.tools.gate.player import in_turns
+
+        return {"log_ratios": list(in_turns(self._players[base], self._players[head], size, count))}
+
+    def respond(self, player: str, count: int, rate_hz: float, paced: bool) -> dict[str, Any]:
+        """Response times of single frames."""
+        return {"responses_us": self._players[player].responses_us(count, rate_hz, paced=paced).tolist()}
+
+    def detect(self, detector: dict[str, Any], capture: dict[str, Any], candidates: bool, to: str) -> dict[str, Any]:
+        """Run a detector on a whole capture; detections, and the peaks before its filters, go into files."""
+        from uwbbench.run.folder.tables import write_detections
+
+        opened = _opened(capture)
+        found = _loaded(detector).run(opened, candidates=candidates)
+        write_detections(Path(to), found)
+        if candidates and found.candidates is not None:
+            write_detections(Path(to).with_suffix(".candidates.parquet"), found.candidates)
+        return {"sha256": opened.sha256, "frames": len(opened)}
+
+
+def _opened(capture: dict[str, Any]) -> Capture:
+    from uwbbench.config.source import CaptureRef
+
+    return CaptureRef(**{**capture, "roots": tuple(capture["roots"])}).open()
+
+
+def _loaded(detector: dict[str, Any]) -> Any:
+    from uwbbench.detect.pipeline import load_detector
+
+    return load_detector(detector["use"], changes=detector["set"])
+
+
+def main() -> int:
+    """Answer until the input ends."""
+    import uwbbench
+    from uwbbench.api.errors import UwbbenchError
+
+    answers = os.fdopen(os.dup(1), "w", buffering=1)
+    os.dup2(2, 1)  # whatever a plugin prints must not end up among the answers
+    pinned = _pin()
+    hello = {"protocol": PROTOCOL, "uwbbench": uwbbench.__version__, "folder": str(Path(uwbbench.__file__).parent)}
+    answers.write(json.dumps({**hello, "pinned": pinned}) + "\n")
+    session = Session()
+    for line in sys.stdin:
+        request = json.loads(line)
+        try:
+            answer = getattr(session, request.pop("do"))(**request)
+        except UwbbenchError as error:
+            answer = {"error": str(error)}
+        answers.write(json.dumps(answer) + "\n")
+    return 0
+
+
+def _pin() -> bool:
+    """Keep this process on one core, the same for all workers: they take turns and never run at once."""
+    if not hasattr(os, "sched_setaffinity"):
+        return False
+    os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})  # interrupts tend to be served by the first
+    return True
+
+
+if __name__ == "__main__":
+    sys.exit(main())

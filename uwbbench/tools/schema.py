@@ -1,0 +1,113 @@
+"""JSON Schema of the files that people write, for editors that complete and check while typing.
+
+The schemas are made from the models that check the files, with the parameters of every installed plugin. Editors know
+what a file looks like, not what is in other files: only ``uwbbench validate`` follows ``extends`` and ``set``.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+from pydantic import BaseModel
+from pydantic.json_schema import models_json_schema
+
+from uwbbench.api import registry
+from uwbbench.api.errors import PluginError
+from uwbbench.config.detector import BY_CHANNEL, DetectorModel, StepModel
+from uwbbench.run.experiment import DatasetUse, ExperimentModel
+from uwbbench.tools.gate.config import GateModel
+from uwbbench.tools.tune.config import TuneModel
+
+Schema = dict[str, Any]
+DIALECT = "https://json-schema.org/draft/2020-12/schema"
+_ABOUT = ("title", "description", "default")
+
+
+def detector_schema() -> Schema:
+    """JSON Schema of a detector file; each step's parameters follow from its ``use`` and may depend on the channel."""
+    return _file_schema(DetectorModel, StepModel, "stages", by_channel=True)
+
+
+def experiment_schema() -> Schema:
+    """JSON Schema of an experiment file; each dataset's parameters follow from its ``use``."""
+    schema = _file_schema(ExperimentModel, DatasetUse, "datasets", by_channel=False)
+    properties = schema["properties"]
+    # The two short forms that the model accepts: `scoring: frame` and `latency: false`.
+    properties["scoring"] = _or(properties["scoring"], properties["scoring"]["items"])
+    properties["latency"] = _or(properties["latency"], {"type": "boolean"})
+    return schema
+
+
+def gate_schema() -> Schema:
+    """JSON Schema of a gate file; each dataset's parameters follow from its ``use``."""
+    return _file_schema(GateModel, DatasetUse, "datasets", by_channel=False)
+
+
+def tuning_schema() -> Schema:
+    """JSON Schema of a tuning file; each dataset's parameters follow from its ``use``."""
+    return _file_schema(TuneModel, DatasetUse, "datasets", by_channel=False)
+
+
+def scene_schema() -> Schema:
+    """JSON Schema of a scene file; each term's parameters follow from its ``use``.
+
+    Raises
+    ------
+    PluginError
+        If the dataset that reads scenes cannot be loaded.
+    """
+    simulated = registry.load_plugin("datasets", "simulated")
+    return _file_schema(simulated.scene_model, simulated.term_model, "terms", by_channel=False)
+
+
+def _file_schema(
+    model: type[BaseModel], item: type[BaseModel], kind: Literal["stages", "datasets", "terms"], *, by_channel: bool
+) -> Schema:
+    """Schema of a file, whose items of one model choose a plugin by ``use`` and hold its ``params``."""
+    loaded: dict[str, type[BaseModel]] = {}
+    broken: dict[str, str] = {}
+    for name in registry.entries(kind):
+        try:
+            loaded[name] = registry.load_plugin(kind, name).params_type()
+        except PluginError as error:
+            broken[name] = str(error)  # shown beside the name: one broken plugin does not take the others' schema away
+    models = dict.fromkeys([model, *loaded.values()])
+    places, whole = models_json_schema([(one, "validation") for one in models], by_alias=True)
+    definitions: dict[str, Schema] = whole["$defs"]
+    names = {params: places[params, "validation"]["$ref"].rsplit("/", 1)[1] for params in loaded.values()}
+    for name in set(names.values()) if by_channel else ():
+        own = definitions[name].get("properties", {})
+        own |= {key: _or_by_channel(value) for key, value in own.items()}
+    choices = []
+    for name, params in loaded.items():
+        chosen: Schema = {"properties": {"params": places[params, "validation"]}}
+        if definitions[names[params]].get("required"):
+            chosen["required"] = ["params"]
+        choices.append({"if": {"properties": {"use": {"const": name}}, "required": ["use"]}, "then": chosen})
+    step = definitions[item.__name__]
+    step["properties"]["use"] |= {"enum": [*loaded, *broken]}
+    if broken:
+        step["properties"]["use"]["description"] += " " + " ".join(broken.values())
+    step["allOf"] = choices
+    file = definitions.pop(model.__name__)
+    required = file.pop("required")
+    if "extends" not in model.model_fields:
+        return {"$schema": DIALECT, **file, "required": required, "$defs": definitions}
+    inherits: Schema = {"if": {"required": ["extends"]}, "else": {"required": required}}
+    inherits["dependentRequired"] = {"set": ["extends"]}
+    return {"$schema": DIALECT, **file, **inherits, "$defs": definitions}
+
+
+def _or_by_channel(value: Schema) -> Schema:
+    """Schema of a parameter that may also be ``{by_channel: {5: ..., 9: ..., other: ...}}``."""
+    plain = {key: part for key, part in value.items() if key not in _ABOUT}
+    table: Schema = {"type": "object", "patternProperties": {r"^([0-9]+|other)$": plain}}
+    table |= {"additionalProperties": False, "minProperties": 1}
+    channels = {"type": "object", "properties": {BY_CHANNEL: table}, "required": [BY_CHANNEL]}
+    return _or(value, {**channels, "additionalProperties": False})
+
+
+def _or(value: Schema, other: Schema) -> Schema:
+    """Schema of what may also have another form; what is said about it stays outside."""
+    about = {key: value[key] for key in _ABOUT if key in value}
+    return {**about, "anyOf": [{key: part for key, part in value.items() if key not in _ABOUT}, other]}

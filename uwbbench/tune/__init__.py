@@ -1,8 +1,0 @@
-"""Tuning: the thresholds of highest F1 on some captures, what they are worth on others, and how much they matter."""
-
-from uwbbench.tune.config import Tuning, read_tuning
-from uwbbench.tune.execute import Tuned, TuneOutcome, tune
-from uwbbench.tune.publish import new_folder, publish, to_dict
-from uwbbench.tune.sheets import sheets
-
-__all__ = ["TuneOutcome", "Tuned", "Tuning", "new_folder", "publish", "read_tuning", "sheets", "to_dict", "tune"]
