@@ -230,7 +230,17 @@ class Detections:
     ) -> Detections:
         """Return the same rows with other facts about them; what is not given stays.
 
-        ``processed`` may be the first frame of a block and a mask of its frames.
+        Parameters
+        ----------
+        processed : (m,) int array, or int and (frames,) bool array, optional
+            Indices of the frames that a detector has looked at, rising; or the first frame of a block and a mask of its
+            frames.
+        notes : sequence of str, optional
+            What a reader of the results must know; replaces the notes there are.
+        candidates : Detections or callable, optional
+            Every peak before the filters, or a function that finds them on demand.
+        chain : mapping or callable, optional
+            Detections left behind each step of the pipeline, in order, or a function that counts them.
         """
         made = self._with(self._columns)
         if processed is not None:

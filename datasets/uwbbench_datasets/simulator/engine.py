@@ -230,6 +230,17 @@ def _block(parts: list[_Part], view: View, block: int) -> tuple[Responses, list[
 def add_paths(antennas: ComplexArray, paths: Paths, view: View, name: str = "paths") -> None:
     """Add the pulses of paths to the responses (1 or 2, frames, taps) of the antennas, in place.
 
+    Parameters
+    ----------
+    antennas : (1 or 2, frames, taps) complex array
+        Responses so far; the second antenna is that of the array. Written.
+    paths : Paths
+        Delays count from the crest of each frame's direct path.
+    view : View
+        The same frames; gives the crest's tap, the pulse, the sample interval and the phase between the antennas.
+    name : str
+        Name of the term that gives the paths, for messages.
+
     Raises
     ------
     CaptureError

@@ -146,6 +146,15 @@ def _families(names: Iterable[str]) -> list[str]:
 def labels_of(values: np.ndarray, path: Path, column: str) -> list[str]:
     """Values of a column as text, whole numbers without a decimal point.
 
+    Parameters
+    ----------
+    values : array
+        Cells of the column as stored: numbers, text or bytes, one for each row.
+    path : Path
+        File of the column, for messages.
+    column : str
+        Name of the column, for messages.
+
     Raises
     ------
     CaptureError

@@ -177,7 +177,16 @@ def _gather(training: FloatArray, factor: float, cell: float, into: FloatArray, 
 
 @compiled
 def is_crest(amplitude: FloatArray, tap: int, reach: int) -> bool:
-    """Whether no tap within ``reach`` exceeds this one; of equal ones the first is the crest."""
+    """Whether no tap within ``reach`` exceeds this one; of equal ones the first is the crest.
+
+    Parameters
+    ----------
+    amplitude : (taps,) array
+        Magnitudes of one frame.
+    tap : int
+    reach : int
+        Taps on either side that are compared, as far as the frame has them.
+    """
     height = amplitude[tap]
     for other in range(max(tap - reach, 0), min(tap + reach + 1, len(amplitude))):
         higher = height > amplitude[other] or (height == amplitude[other] and tap <= other)

@@ -29,7 +29,18 @@ class _Square(NamedTuple):
 
 @compiled
 def core_point_near(grid: Grid, cell: int, x: float, y: float, radius: Radius) -> bool:
-    """Whether a core point of a cell is a neighbour of a point outside the cell."""
+    """Whether a core point of a cell is a neighbour of a point outside the cell.
+
+    Parameters
+    ----------
+    grid : Grid
+        Written where the search tree of the cell lacks core points.
+    cell : int
+        The cell that is searched.
+    x, y : float
+        Coordinates of the point.
+    radius : Radius
+    """
     if not bounds_reach(grid.cells[cell], x, y, radius):
         return False
     if grid.cells[cell].points >= SCANNED:

@@ -21,7 +21,17 @@ FLAT = -2
 
 @compiled
 def find_extremes(amplitude: FloatArray, start: int, ends: FloatArray) -> None:
-    """Write the smallest and the largest magnitude from tap ``start`` on into ``ends`` (2,)."""
+    """Write the smallest and the largest magnitude from tap ``start`` on into ``ends`` (2,).
+
+    Parameters
+    ----------
+    amplitude : (taps,) array
+        Magnitudes.
+    start : int
+        First tap that counts.
+    ends : (2,) array
+        Written: smallest, largest.
+    """
     bits, written = amplitude.view(np.int64), ends.view(np.int64)
     low = high = bits[start]
     for tap in range(start, len(bits)):
@@ -36,7 +46,15 @@ def _scaled_square(value: float, largest: float) -> float:
 
 @inlined
 def root_mean_square(amplitude: FloatArray, start: int, stop: int) -> float:
-    """Root mean square of taps ``start`` to ``stop``, scaled by the largest and added up as numpy does."""
+    """Root mean square of taps ``start`` to ``stop``, scaled by the largest and added up as numpy does.
+
+    Parameters
+    ----------
+    amplitude : (taps,) array
+        Magnitudes.
+    start, stop : int
+        First tap, and the one behind the last; at least one tap and, for numpy's order, at most 128.
+    """
     largest = 0.0
     for tap in range(start, stop):
         largest = max(largest, amplitude[tap])
@@ -69,7 +87,15 @@ def median_noise(amplitude: FloatArray) -> float:
 
 @compiled
 def crest_tap(amplitude: FloatArray, start: int, stop: int) -> int:
-    """First of the largest magnitudes of taps ``start`` to ``stop``."""
+    """First of the largest magnitudes of taps ``start`` to ``stop``.
+
+    Parameters
+    ----------
+    amplitude : (taps,) array
+        Magnitudes.
+    start, stop : int
+        First tap, and the one behind the last; ``start`` is the answer where that leaves none.
+    """
     best = start
     for tap in range(start + 1, stop):
         if amplitude[tap] > amplitude[best]:
@@ -80,6 +106,15 @@ def crest_tap(amplitude: FloatArray, start: int, stop: int) -> int:
 @compiled
 def vertex_shift(amplitude: FloatArray, tap: int, logarithmic: bool) -> tuple[float, bool]:
     """Distance in taps from a crest to the vertex of the parabola through three magnitudes.
+
+    Parameters
+    ----------
+    amplitude : (taps,) array
+        Magnitudes.
+    tap : int
+        Where the crest is.
+    logarithmic : bool
+        Take the parabola through the logarithms, where none of the three magnitudes is zero.
 
     Returns
     -------
@@ -140,7 +175,13 @@ def strongest_crest(heights: IntArray, strengths: IntArray, earliest: int, bound
 def find_maxima(profile: FloatArray, marked: Any, peaks: IntArray) -> int:
     """Write the taps of all local maxima, the middle of flat ones rounded down; how many they are.
 
-    ``marked`` (taps,) is room for a mark of each tap.
+    Parameters
+    ----------
+    profile : (taps,) array
+    marked : (taps,) uint8 array
+        Room for a mark of each tap; written.
+    peaks : (taps,) int array
+        Written: the taps, rising; what lies behind them means nothing.
     """
     bits = profile.view(np.int64)
     last = len(bits) - 1

@@ -139,7 +139,17 @@ taps_behind = operation(_scan("ctlz"))
 
 @operation
 def measure_block(_typing: Any, samples: Any, _row: Any, _tap: Any, amplitude: Any) -> Any:
-    """``measure_block(samples, row, tap, amplitude)``: magnitudes of BLOCK taps of a row of samples from a tap on."""
+    """``measure_block(samples, row, tap, amplitude)``: magnitudes of BLOCK taps of a row of samples from a tap on.
+
+    Parameters
+    ----------
+    _typing : Any
+        numba's typing context.
+    samples, amplitude : numba types
+        Of a (frames, taps) complex64 or complex128 array, and of the (room,) float64 array that is written.
+    _row, _tap : numba types
+        Of the row, and of the first of the BLOCK taps.
+    """
     part = ir.FloatType() if samples.dtype == types.complex64 else _REAL
 
     def lowered(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
@@ -162,7 +172,19 @@ def measure_block(_typing: Any, samples: Any, _row: Any, _tap: Any, amplitude: A
 
 @operation
 def scale_block(_typing: Any, amplitude: Any, _tap: Any, _low: Any, _span: Any, profile: Any) -> Any:
-    """``scale_block(amplitude, tap, low, span, profile)``: ``(amplitude - low) / span`` of BLOCK taps from a tap on."""
+    """``scale_block(amplitude, tap, low, span, profile)``: ``(amplitude - low) / span`` of BLOCK taps from a tap on.
+
+    Parameters
+    ----------
+    _typing : Any
+        numba's typing context.
+    amplitude, profile : numba types
+        Of two (room,) float64 arrays: magnitudes, and the profile that is written.
+    _tap : numba type
+        Of the first of the BLOCK taps.
+    _low, _span : numba types
+        Of the least magnitude of the frame, and of its distance to the largest.
+    """
 
     def lowered(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         source, tap, low, span, written = arguments

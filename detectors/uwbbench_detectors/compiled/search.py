@@ -257,7 +257,22 @@ def search_alone(
     table: FloatArray,
     irregular: Any,
 ) -> int:
-    """Search where nothing but the samples is needed: a short call is cheaper with fewer arrays to hand over."""
+    """Search where nothing but the samples is needed: a short call is cheaper with fewer arrays to hand over.
+
+    Parameters
+    ----------
+    samples, valid, first : arrays and int
+        As of :func:`search`.
+    how, limits : (HOW,) int array, (LIMITS,) array
+        The ``settings`` and ``bounds`` of :func:`search`, which must need no other input.
+    order, noise_tally, table, irregular : arrays
+        As of :func:`search`; the last three are written.
+
+    Returns
+    -------
+    int
+        As of :func:`search`.
+    """
     anything = limits
     return search(
         samples,

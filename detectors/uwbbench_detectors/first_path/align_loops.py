@@ -18,6 +18,16 @@ def vertex_shift(before: float, crest: float, after: float) -> float:
     """Distance from a crest to the vertex of the parabola through the logarithms of three magnitudes.
 
     What :func:`uwbbench_detectors.peaks.interpolation.vertex_shift` gives for one crest.
+
+    Parameters
+    ----------
+    before, crest, after : float
+        Magnitudes at consecutive points, not negative.
+
+    Returns
+    -------
+    float
+        Points, between -0.5 and 0.5; 0 where the crest is zero or the parabola opens upwards.
     """
     if not crest > 0:
         return 0.0
