@@ -115,8 +115,8 @@ def bistatic_range(excess_m: FloatArray, towards: FloatArray, baseline_m: FloatA
     distance = float(np.linalg.norm(baseline))
     along = towards @ baseline if towards.size else np.zeros(len(excess_m))
     with np.errstate(divide="ignore", invalid="ignore"):
-        found = excess_m * (excess_m + 2 * distance) / (2 * (excess_m + (distance - along)))
-    return np.asarray(np.where(excess_m > 0, found, np.where(excess_m == 0, 0.0, np.nan)))
+        range_m = excess_m * (excess_m + 2 * distance) / (2 * (excess_m + (distance - along)))
+    return np.asarray(np.where(excess_m > 0, range_m, np.where(excess_m == 0, 0.0, np.nan)))
 
 
 def bistatic_range_sine(excess_m: FloatArray, azimuth_rad: FloatArray, distance_m: float) -> FloatArray:
@@ -140,8 +140,8 @@ def bistatic_range_sine(excess_m: FloatArray, azimuth_rad: FloatArray, distance_
         Range in metres; NaN where the path is shorter than the baseline, which no target can cause.
     """
     with np.errstate(divide="ignore", invalid="ignore"):
-        found = excess_m * (excess_m + 2 * distance_m) / (2 * (excess_m + distance_m * (1 + np.sin(azimuth_rad))))
-    return np.asarray(np.where(excess_m > 0, found, np.where(excess_m == 0, 0.0, np.nan)))
+        range_m = excess_m * (excess_m + 2 * distance_m) / (2 * (excess_m + distance_m * (1 + np.sin(azimuth_rad))))
+    return np.asarray(np.where(excess_m > 0, range_m, np.where(excess_m == 0, 0.0, np.nan)))
 
 
 def excess_path(points_m: FloatArray, baseline_m: FloatArray) -> FloatArray:

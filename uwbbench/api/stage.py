@@ -101,7 +101,7 @@ class Stage(Generic[P]):
         return None
 
     def note(self, text: str) -> None:
-        """Tell the reader of the results something, once."""
+        """Add a note for the reader of the results, once."""
         if text not in self.notes:
             self.notes.append(text)
 

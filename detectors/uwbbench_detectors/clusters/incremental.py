@@ -82,7 +82,7 @@ class IncrementalDbscan:
         if len(points) and not np.abs(points).max() < LARGEST_INDEX * self.radius.side:
             raise ValueError(
                 f"points lie farther than {LARGEST_INDEX * self.radius.side:g} from the origin, or nowhere: too far "
-                f"to tell neighbours within {self.radius.squared**0.5:g}"
+                f"to resolve neighbours within {self.radius.squared**0.5:g}"
             )
         self.grid = self.grid.with_room(len(points))
         room = self.grid.points[len(self) : len(self) + len(points)]

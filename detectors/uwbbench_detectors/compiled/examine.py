@@ -2,7 +2,7 @@
 
 Filters that look at single peaks commute, and the strongest peak that passes them all is the first one to pass by
 falling amplitude. So where one is wanted, peaks are examined in that order, each by the cheapest question first, and
-what nobody asks for is never computed. After a few rejections all peaks are described in one pass instead, whose cost
+what is not needed is never computed. After a few rejections all peaks are described in one pass instead, whose cost
 grows with the taps alone.
 """
 
@@ -104,12 +104,8 @@ def examine_sets(
         Magnitudes, with room for whole blocks of taps.
     profile : (room,) array
         Curve that is searched, counted from the first tap of the frame, with the same room.
-    responses1, responses2 : (frames, taps) complex array
-        Responses behind the phase difference, where it is computed; unused otherwise.
-    how, limits : tuple
-        Settings, laid out as in :mod:`uwbbench_detectors.compiled.layout`.
-    signal : Signal
-        The frame's row, noise and first path.
+    responses1, responses2, how, limits, signal
+        As of :func:`examine_by_strength`.
     inside : int
         Set of the taps of the profile.
     stop : int
@@ -218,16 +214,8 @@ def examine_all(
 
     Parameters
     ----------
-    amplitude : (taps,) array
-        Magnitudes.
-    profile : (taps - start,) array
-        Curve that is searched, from the tap PROFILE_START on.
-    responses1, responses2 : (frames, taps) complex array
-        Responses behind the phase difference, where it is computed; unused otherwise.
-    how, limits : tuple
-        Settings, laid out as in :mod:`uwbbench_detectors.compiled.layout`.
-    signal : Signal
-        The frame's row, noise and first path.
+    amplitude, profile, responses1, responses2, how, limits, signal
+        As of :func:`examine_by_strength`.
     passed : (rows, columns) array
         The first rows take the properties of the peaks kept, in the order of ``layout.COLUMNS``; at least two rows, and
         one for each peak there may be if all are kept.

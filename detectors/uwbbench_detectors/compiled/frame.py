@@ -140,8 +140,8 @@ def vertex_shift(amplitude: FloatArray, tap: int, logarithmic: bool) -> tuple[fl
 def strongest_crest(heights: IntArray, strengths: IntArray, earliest: int, bound: int, bound_place: int) -> int:
     """Place in the profile of the strongest maximum that is left to examine; -1 for none, or FLAT.
 
-    Where the profile rises to a tap and goes on level anywhere, other functions must tell what is a maximum. All taps
-    are looked at alike, many at once, and without a branch, since which of them are maxima cannot be foretold.
+    Where the profile rises to a tap and goes on level anywhere, other functions must decide what is a maximum. All taps
+    are looked at alike, many at once, and without a branch, since which of them are maxima cannot be predicted.
 
     Parameters
     ----------
@@ -163,12 +163,12 @@ def strongest_crest(heights: IntArray, strengths: IntArray, earliest: int, bound
         best = max(best, strengths[place] if crest & left else np.int64(-1))
     if flat:
         return FLAT
-    found = last
+    strongest = last
     for place in range(1, last):
         crest = (heights[place] > heights[place - 1]) & (heights[place] > heights[place + 1]) & (place >= earliest)
         left = (best < bound) | (place > bound_place)
-        found = min(found, place if crest & left & (strengths[place] == best) else last)
-    return found if found < last else -1
+        strongest = min(strongest, place if crest & left & (strengths[place] == best) else last)
+    return strongest if strongest < last else -1
 
 
 @compiled
@@ -191,7 +191,7 @@ def find_maxima(profile: FloatArray, marked: Any, peaks: IntArray) -> int:
         marked[tap] = rises & (bits[tap] >= bits[tap + 1])
         flat += rises & (bits[tap] == bits[tap + 1])
     count = 0
-    for tap in range(1, last):  # without a branch: which taps are maxima cannot be foretold
+    for tap in range(1, last):  # without a branch: which taps are maxima cannot be predicted
         peaks[count] = tap
         count += marked[tap]
     return _without_shoulders(bits, peaks, count) if flat else count

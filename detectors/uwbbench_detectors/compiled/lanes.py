@@ -1,6 +1,6 @@
 """Operations on up to 64 taps at once, where a set of taps is the bits of one whole number: bit i stands for tap i.
 
-What loops and branches tell of one tap after the other (what is the nearest tap that is higher?) is then a comparison
+What loops and branches decide of one tap after the other (what is the nearest tap that is higher?) is then a comparison
 of all taps and a scan for a bit. numba has no such types, so that these few are written in the language of LLVM, which
 makes of them whatever the processor has for it, from one instruction for eight taps down to one tap at a time.
 
@@ -30,12 +30,12 @@ _LARGEST = (1 << 63) - 1
 
 
 def operation(typed: Callable[..., Any]) -> Any:
-    """Function that numba compiles as told; it takes types, and returns a signature and what builds the code."""
+    """Function that numba compiles by rules of its own: of its types, the signature and what builds the code."""
     return intrinsic(typed)
 
 
 def _pointer(context: Any, builder: Any, kind: Any, array: Any, at: Any, pointed: Any) -> Any:
-    """Pointer to element ``at`` of an array, as one to something larger."""
+    """Pointer to element ``at`` of an array, as one to a larger type."""
     data = context.make_array(kind)(context, builder, array).data
     return builder.bitcast(builder.gep(data, [at]), pointed.as_pointer())
 

@@ -1,7 +1,7 @@
 """A frame of at most 64 taps, compiled: what :mod:`frame` and :mod:`shape` do, on all taps at once.
 
-Arrays are counted from the first tap of the frame and have room for whole blocks of LANES taps; what stands beyond the
-frame, or in the profile before its first tap, is in no set of taps and says nothing.
+Arrays are counted from the first tap of the frame and have room for whole blocks of LANES taps; what lies beyond the
+frame, or in the profile before its first tap, is in no set of taps and has no meaning.
 """
 
 from __future__ import annotations

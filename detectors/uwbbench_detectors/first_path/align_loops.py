@@ -45,13 +45,13 @@ def highest(real: FloatArray, imaginary: FloatArray) -> int:
 
     ``hypot``, which neither over- nor underflows, is taken only where it may exceed the largest so far.
     """
-    largest, found = 0.0, 0
+    largest, crest = 0.0, 0
     for place in range(len(real)):
         if max(abs(real[place]), abs(imaginary[place])) * ROOT_2 > largest:
             height = math.hypot(real[place], imaginary[place])
             if height > largest:
-                largest, found = height, place
-    return found
+                largest, crest = height, place
+    return crest
 
 
 @compiled
