@@ -12,6 +12,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from uwbbench.api import registry
 from uwbbench.api.capture import Capture
 from uwbbench.api.capture_file import open_capture, write_capture
 from uwbbench.api.dataset import Card, Dataset
@@ -24,7 +25,7 @@ from uwbbench.tools.check.subject import ClassSubject
 from uwbbench.tools.check.values import Values, same
 
 _CARD, _DATASET, _CAPTURE = "uwbbench.api.dataset.Card", "uwbbench.api.dataset.Dataset", "uwbbench.api.capture.Capture"
-_ONE_A_FRAME = "schema: 1\nname: constant\npipeline:\n  - {use: reference.constant}\n"
+_ONE_A_FRAME = "schema: 1\nname: constant\npipeline:\n  - {{use: {}}}\n"
 
 
 class DatasetSubject(ClassSubject):
@@ -269,7 +270,7 @@ def capture_can_be_kept(subject: DatasetSubject) -> None:
 def detectors_take_it(subject: DatasetSubject) -> str:
     """A detector that answers in every frame without looking does so on the first capture."""
     capture = subject.capture
-    found = detector_from_yaml(_ONE_A_FRAME).run(capture)
+    found = detector_from_yaml(_ONE_A_FRAME.format(registry.default("stage.constant"))).run(capture)
     expected = int(capture.frames().valid.sum())
     if len(found) != expected:
         raise Nonconformity(f"{expected} detections, one for each valid frame", str(len(found)))

@@ -76,8 +76,8 @@ def one_frame_is_in_time(subject: StageSubject) -> str:
     """
     own_s, period_s = _call_s(subject.opened(), subject), 1 / subject.capture.radar.frame_rate_hz
     told = f"{own_s * 1e6:.0f} us a call"
-    if "reference.nothing" in registry.entries("stages"):
-        nothing = StageSubject("reference.nothing").opened()
+    if "stage.idle" in registry.entries("defaults"):
+        nothing = StageSubject(registry.default("stage.idle")).opened()
         told += f", {own_s / _call_s(nothing, subject):.1f} times doing nothing"
     if own_s > period_s:
         raise Nonconformity(f"a call for one frame within {period_s * 1e3:.1f} ms", told)
