@@ -15,13 +15,16 @@ from dataclasses import dataclass
 from functools import cache
 from importlib.metadata import Distribution, entry_points
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 from uwbbench.api.errors import PluginError, nearest
 
 ClassKind = Literal["stages", "datasets", "metrics", "terms", "kernels"]
 PluginKind = ClassKind | Literal["detectors"]
 Group = PluginKind | Literal["defaults", "cases"]
+AuthoredKind = Literal["stage", "detector", "dataset", "metric"]
+"""Kinds, in the singular, that a package can be written for and that have conformance checks."""
+AUTHORED_KINDS: tuple[AuthoredKind, ...] = get_args(AuthoredKind)
 KINDS: tuple[PluginKind, ...] = ("stages", "detectors", "datasets", "metrics", "terms")
 """Kinds whose names people write in files; kernels step in by themselves."""
 

@@ -15,11 +15,13 @@ from numpy.typing import NDArray
 from uwbbench.api import registry
 from uwbbench.api.capture import Capture
 from uwbbench.api.capture_file import open_capture, write_capture
+from uwbbench.api.case import NotApplicable, last_line
 from uwbbench.api.dataset import Card, Dataset
 from uwbbench.api.errors import CaptureError
 from uwbbench.api.frames import Frames
+from uwbbench.api.registry import AuthoredKind
 from uwbbench.detect.pipeline import detector_from_yaml
-from uwbbench.tools.check.check import Kind, Nonconformity, NotApplicable, check, last_line
+from uwbbench.tools.check.check import Nonconformity, check
 from uwbbench.tools.check.params import working_params
 from uwbbench.tools.check.subject import ClassSubject
 from uwbbench.tools.check.values import Values, same
@@ -31,7 +33,7 @@ _ONE_A_FRAME = "schema: 1\nname: constant\npipeline:\n  - {{use: {}}}\n"
 class DatasetSubject(ClassSubject):
     """One dataset adapter, and the first of its captures."""
 
-    kind: ClassVar[Kind] = "dataset"
+    kind: ClassVar[AuthoredKind] = "dataset"
     base: ClassVar[type] = Dataset
 
     @cached_property

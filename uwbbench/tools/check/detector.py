@@ -17,11 +17,14 @@ from numpy.typing import NDArray
 
 from uwbbench.api import registry
 from uwbbench.api.capture import Capture
+from uwbbench.api.case import NotApplicable
 from uwbbench.api.detections import Detections
 from uwbbench.api.errors import ConfigError
+from uwbbench.api.registry import AuthoredKind
 from uwbbench.detect.pipeline import Pipeline, detector_from_yaml, load_detector
 from uwbbench.measure.robustness.scene import chosen
-from uwbbench.tools.check.check import Kind, Nonconformity, NotApplicable, check
+from uwbbench.measure.robustness.subject import Subject as HardSubject
+from uwbbench.tools.check.check import Nonconformity, check
 from uwbbench.tools.check.inputs import CUTS, usual_capture
 from uwbbench.tools.check.subject import Subject
 from uwbbench.tools.check.values import Values, of_detections, same
@@ -34,7 +37,7 @@ _IDLE = "schema: 1\nname: idle\npipeline:\n  - {{use: {}}}\n"
 class DetectorSubject(Subject):
     """One detector; the parameters given are values to change in it, by path."""
 
-    kind: ClassVar[Kind] = "detector"
+    kind: ClassVar[AuthoredKind] = "detector"
 
     def __init__(self, name: str, params: Mapping[str, Any] | None = None, roots: tuple[Path, ...] = ()) -> None:
         super().__init__(name, params, roots)
@@ -44,6 +47,13 @@ class DetectorSubject(Subject):
     def capture(self) -> Capture:
         """The usual capture."""
         return usual_capture()
+
+    @cached_property
+    def hardened(self) -> HardSubject:
+        """The detector as hard cases want it; its undisturbed run is shared by them."""
+        subject = HardSubject(self.pipeline)
+        self.pipeline.open(subject.capture)  # a detector that refuses the capture says why
+        return subject
 
     @cached_property
     def found(self) -> Detections:

@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 
 from uwbbench.api import registry
+from uwbbench.api.case import NotApplicable
 from uwbbench.api.stage import Stage
-from uwbbench.tools.check.check import Nonconformity, NotApplicable, check
+from uwbbench.tools.check.check import Nonconformity, check
 from uwbbench.tools.check.inputs import CUTS, cut, pieces
 from uwbbench.tools.check.stage_subject import StageSubject
 from uwbbench.tools.check.values import Values, of_blocks, same

@@ -14,10 +14,12 @@ from numpy.typing import NDArray
 from uwbbench.api import registry
 from uwbbench.api.block import Block
 from uwbbench.api.capture import Capture
+from uwbbench.api.case import NotApplicable
 from uwbbench.api.detections import Detections
 from uwbbench.api.errors import UwbbenchError
+from uwbbench.api.registry import AuthoredKind
 from uwbbench.api.stage import Stage
-from uwbbench.tools.check.check import Kind, Nonconformity, NotApplicable
+from uwbbench.tools.check.check import Nonconformity
 from uwbbench.tools.check.inputs import frames_of, pieces, usual_capture
 from uwbbench.tools.check.params import working_params
 from uwbbench.tools.check.subject import ClassSubject
@@ -30,7 +32,7 @@ PARTS = {"first_path": "first_path", "noise": "noise_rms", "profile": "profile"}
 class StageSubject(ClassSubject):
     """One stage, and the usual block that it is given."""
 
-    kind: ClassVar[Kind] = "stage"
+    kind: ClassVar[AuthoredKind] = "stage"
     base: ClassVar[type] = Stage
 
     @cached_property
