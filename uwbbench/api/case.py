@@ -13,7 +13,7 @@ import traceback
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from types import ModuleType
-from typing import Any, Literal, get_args
+from typing import Any, Literal, Self, TypeVar, get_args
 
 from uwbbench.api.errors import ConfigError, UwbbenchError, nearest
 
@@ -21,6 +21,9 @@ Expectation = Literal["reject", "survive", "equal"]
 """Yield nothing; carry on soundly; or give what a reference gives, within a tolerance."""
 Status = Literal["passed", "failed", "error", "not applicable"]
 STATUSES: tuple[Status, ...] = get_args(Status)
+
+
+C = TypeVar("C", bound="Check")
 
 
 class Violation(Exception):
@@ -131,7 +134,7 @@ class Check:
     read_more: str = ""
 
     @classmethod
-    def named_after(cls, run: Callable[[Any], Evidence | str | None], **facts: Any) -> Any:
+    def named_after(cls, run: Callable[[Any], Evidence | str | None], **facts: Any) -> Self:
         """Check of a function: named like it, and stated by the first paragraph of its docstring."""
         statement = " ".join(inspect.cleandoc(run.__doc__ or "").partition("\n\n")[0].split())
         return cls(name=run.__name__.replace("_", "-"), statement=statement, run=run, **facts)
@@ -185,12 +188,7 @@ class HardCase(Check):
 
 def hard_case(expectation: Expectation) -> Callable[[Callable[[Any], Evidence]], HardCase]:
     """Make a hard case of a function, whose docstring says in its first paragraph what is expected."""
-
-    def made(run: Callable[[Any], Evidence]) -> HardCase:
-        case: HardCase = HardCase.named_after(run, group=run.__module__.rpartition(".")[2], expectation=expectation)
-        return case
-
-    return made
+    return lambda run: HardCase.named_after(run, group=run.__module__.rpartition(".")[2], expectation=expectation)
 
 
 def cases_of(*modules: ModuleType) -> tuple[HardCase, ...]:
@@ -219,7 +217,7 @@ class Examination:
         return sum(result.status == status for result in self.results)
 
 
-def select(checks: Iterable[Check], names: Sequence[str], what: str) -> list[Any]:
+def select(checks: Iterable[C], names: Sequence[str], what: str) -> list[C]:
     """Checks of these names, in their order.
 
     Parameters

@@ -7,7 +7,6 @@ from functools import cached_property
 
 import numpy as np
 
-from uwbbench.api import registry
 from uwbbench.api.capture import Capture
 from uwbbench.api.case import NotApplicable, Violation
 from uwbbench.api.detections import Detections
@@ -44,7 +43,7 @@ class Subject(StagesOnTrial):
     @cached_property
     def looks_at_samples(self) -> bool:
         """Whether any stage consumes frames; references, such as an oracle, need not."""
-        return any("frames" in registry.load_plugin("stages", step.use).consumes for step in self.pipeline.config.steps)
+        return any("frames" in stage.consumes for _, stage in self.stages())
 
     def run(self, capture: Capture) -> Detections:
         """Detections on a whole capture.

@@ -97,8 +97,7 @@ def case_named(name: str) -> HardCase:
     ConfigError
         If there is none of that name.
     """
-    case: HardCase = select(all_cases(), [name], "hard case")[0]
-    return case
+    return select(all_cases(), [name], "hard case")[0]
 
 
 def examine(pipeline: Pipeline, cases: Sequence[HardCase] | None = None) -> Stability:

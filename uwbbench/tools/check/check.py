@@ -29,10 +29,5 @@ def check(read_more: str) -> Callable[[Callable[[Any], str | None]], Check]:
     read_more : str
         Dotted name of what explains it, for ``python -m pydoc``, or a whole command.
     """
-
-    def made(run: Callable[[Any], str | None]) -> Check:
-        command = read_more if " " in read_more else f"python -m pydoc {read_more}"
-        one: Check = Check.named_after(run, read_more=command)
-        return one
-
-    return made
+    command = read_more if " " in read_more else f"python -m pydoc {read_more}"
+    return lambda run: Check.named_after(run, read_more=command)

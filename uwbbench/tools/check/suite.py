@@ -4,22 +4,22 @@ from __future__ import annotations
 
 import unittest
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 from uwbbench.api import registry
-from uwbbench.api.case import STATUSES, Check, CheckResult, Examination, select
+from uwbbench.api.case import STATUSES, Check, CheckResult, Examination, HardCase, select
 from uwbbench.api.errors import PluginError, nearest
 from uwbbench.api.locate import shipped
 from uwbbench.api.registry import AUTHORED_KINDS, AuthoredKind
+from uwbbench.measure.robustness import all_cases
 from uwbbench.tools.check import (
     conduct,
     dataset,
     declaration,
     detector,
-    detector_cases,
     metric,
     source,
     stage_inputs,
@@ -81,7 +81,13 @@ def _row(result: CheckResult) -> dict[str, Any]:
 
 def all_checks(kind: AuthoredKind) -> tuple[Check, ...]:
     """Every check that a kind of plugin is put to, in order."""
-    return _CHECKS[kind] + (detector_cases.hard_checks() if kind == "detector" else ())
+    return _CHECKS[kind] + (tuple(_of_detectors(case) for case in all_cases()) if kind == "detector" else ())
+
+
+def _of_detectors(case: HardCase) -> Check:
+    """A hard case as a check of detectors."""
+    command = f"uwbbench stability --case {case.name} --detector NAME"
+    return replace(case, name=f"hard-{case.name}", run=lambda subject: case.run(subject.hardened), read_more=command)
 
 
 def kinds_of(name: str) -> tuple[AuthoredKind, ...]:
