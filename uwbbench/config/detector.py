@@ -16,15 +16,6 @@ from uwbbench.api.locate import find_config
 from uwbbench.api.override import merged, with_values
 from uwbbench.api.yaml_file import YamlFile, parse_yaml, read_yaml
 
-IMPLIED = {
-    "profile": "profile.minmax",
-    "first_path": "first_path.crest",
-    "noise": "noise_floor",
-    "score_db": "score.snr",
-    "range_m": "range",
-}
-"""Stages that are put in, with their defaults and a note, where a step uses a port that no step of the file makes."""
-
 BY_CHANNEL = "by_channel"
 """Key of a parameter whose value depends on the capture's channel: ``{by_channel: {5: 1.0, 9: 0.2, other: 0.2}}``."""
 
@@ -206,8 +197,8 @@ def _completed(steps: list[Step]) -> list[Step]:
 
     def put(step: Step) -> None:
         for port in sorted(registry.load_plugin("stages", step.use).consumes - made):
-            use = IMPLIED.get(port)
-            if use in registry.entries("stages") and use not in taken:
+            use = _implied(port)
+            if use is not None and use not in taken:
                 made.update(registry.load_plugin("stages", use).produces)
                 taken.add(use)
                 put(Step(use, use, place=step.place, implied_by=step.label))
@@ -216,6 +207,12 @@ def _completed(steps: list[Step]) -> list[Step]:
     for step in steps:
         put(step)
     return whole
+
+
+def _implied(port: str) -> str | None:
+    """Stage that is put in, with its defaults and a note, where no step of a file makes a port; None for none."""
+    use = registry.makers().get(port)
+    return use if use in registry.entries("stages") and registry.load_plugin("stages", use).implied else None
 
 
 def _with_named_channels(params: Mapping[str, Any], source: YamlFile, index: int) -> dict[str, Any]:

@@ -23,6 +23,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from uwbbench.api import registry
 from uwbbench.api.arrays import BoolArray, FloatArray, IntArray
 from uwbbench.api.capture import CaptureHeader
 from uwbbench.api.detections import Detections
@@ -33,7 +34,6 @@ from uwbbench.run.folder.folder import RunFolder
 if TYPE_CHECKING:
     import pandas as pd
 
-DATASET = "limits"
 SYMBOL_S, ROLL_OFF = 2.0e-9, 0.5
 """Root-raised-cosine pulse of the dataset (IEEE 802.15.4 HRP reference)."""
 GATE_M = 0.20
@@ -149,7 +149,8 @@ class Limits:
     def trials(self) -> list[Trial]:
         """Every detector on every test signal, in the order of the experiment."""
         used = self.folder.manifest["experiment"]["datasets"]
-        params = {one["label"]: one["params"] for one in used if one["use"] == DATASET}
+        signals = registry.default("dataset.limits")
+        params = {one["label"]: one["params"] for one in used if one["use"] == signals}
         entries = [
             e for e in self.folder.entries() if (e.kind, e.status) == ("accuracy", "done") and e.dataset in params
         ]

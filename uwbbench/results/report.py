@@ -191,9 +191,9 @@ class Report:
         for entry in self._of_kind("accuracy"):
             for step, count in entry.facts["chain"].items():
                 counts[entry.detector, entry.dataset, step] += count
-            clustered = self.folder.detections(entry.unit)["cluster"] >= 0
-            if "dbscan" in entry.facts["chain"]:
-                counts[entry.detector, entry.dataset, "in clusters"] += int(clustered.sum())
+            found = self.folder.detections(entry.unit)
+            if "cluster" in found:
+                counts[entry.detector, entry.dataset, "in clusters"] += int((found["cluster"] >= 0).sum())
         rows = [(*key, count) for key, count in counts.items()]
         datasets = [used["label"] for used in self.experiment["datasets"]]
         rows.sort(key=lambda row: (self.detectors.index(row[0]), datasets.index(row[1])))

@@ -6,6 +6,7 @@ import dataclasses
 import traceback
 
 from uwbbench import __version__
+from uwbbench.api import registry
 from uwbbench.api.errors import UwbbenchError
 from uwbbench.config.detector import DetectorConfig
 from uwbbench.detect.pipeline import Pipeline
@@ -21,8 +22,10 @@ def unit_of(detector: DetectorConfig) -> str:
 
 
 def identity_of(detector: DetectorConfig) -> str:
-    """Hash of all that the result depends on: the detector with its sources, and the version of the cases."""
-    return digest(["stability", Pipeline(detector).identity, __version__])
+    """Hash of all that the result depends on: the detector with its sources, and the versions of the cases."""
+    own = f"uwbbench {__version__}"
+    others = sorted({entry.package for entry in registry.entries("cases").values()} - {own})
+    return digest(["stability", Pipeline(detector).identity, __version__, *others])
 
 
 def examined(detector: DetectorConfig, parent: int) -> Entry:

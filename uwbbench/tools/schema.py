@@ -56,8 +56,8 @@ def scene_schema() -> Schema:
     PluginError
         If the dataset that reads scenes cannot be loaded.
     """
-    simulated = registry.load_plugin("datasets", "simulated")
-    return _file_schema(simulated.scene_model, simulated.term_model, "terms", by_channel=False)
+    simulator = registry.load_plugin("datasets", registry.default("dataset.scenes"))
+    return _file_schema(simulator.scene_model, simulator.term_model, "terms", by_channel=False)
 
 
 def _file_schema(

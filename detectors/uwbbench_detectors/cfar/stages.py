@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import ClassVar, Literal, Self, TypeVar
 
 import numpy as np
@@ -136,6 +137,11 @@ class Cfar(Stage[P]):
             (order_rank(self._rank, self._half), order_rank(self._rank, 2 * self._half)),
             max(self._guard, 1) if p.cells == "maxima" else 0,
         )
+
+    @property
+    def resolves_taps(self) -> float:
+        """The guard taps for means of training cells, which a second echo raises; an order statistic passes it by."""
+        return self.params.guard_taps if self.statistic in ("ca", "go") else math.inf
 
     @property
     def _rank(self) -> float:

@@ -55,8 +55,6 @@ class DbscanParams(Params):
 class Dbscan(Stage[DbscanParams]):
     """DBSCAN over the world positions of all detections so far, again after every few new points.
 
-    ``clusterings`` counts how often that happened, so that a benchmark can time those calls apart.
-
     A detection is held back until a re-clustering puts it into a cluster, and handed out with that cluster's number;
     over all points so far, membership is never lost, so that waiting is all it takes. What is still noise at the end,
     or when it leaves the ``window``, is handed out with -1, and so is at once a detection without position, which
@@ -86,7 +84,7 @@ class Dbscan(Stage[DbscanParams]):
         self._rounds = self._start()
         self._frames: Frames | None = None
         self._no_detections: Detections | None = None
-        self.clusterings = 0
+        self.clusterings: int = 0
 
     def step(self, block: Block) -> Block:
         """Block with the detections that are ready, their ``cluster`` filled in."""

@@ -85,6 +85,7 @@ class CrestFirstPath(CrestSearch[CrestFirstPathParams]):
     of the first path from the response itself).
     """
 
+    implied = True
     fidelity = "from-source"
 
     def taps_of(self, block: Block) -> FloatArray:

@@ -88,6 +88,7 @@ class MinMaxProfile(Stage[MinMaxProfileParams]):
 
     consumes: ClassVar[frozenset[str]] = ports("frames")
     produces: ClassVar[frozenset[str]] = ports("profile")
+    implied: ClassVar[bool] = True
     fidelity = "from-source"
 
     def open(self, radar: Radar) -> None:

@@ -44,6 +44,7 @@ class SnrScore(Stage[SnrScoreParams]):
 
     consumes: ClassVar[frozenset[str]] = ports("frames", "detections", "tap", "amplitude", "noise", "first_path")
     produces: ClassVar[frozenset[str]] = ports("score_db")
+    implied: ClassVar[bool] = True
     rowwise: ClassVar[bool] = True
     fidelity = "from-source"
 

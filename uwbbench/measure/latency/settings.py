@@ -6,6 +6,8 @@ from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from uwbbench.api import registry
+
 
 class LatencyModel(BaseModel):
     """How calls are timed."""
@@ -17,7 +19,7 @@ class LatencyModel(BaseModel):
     frames: int = Field(default=2000, ge=1, description="Frames timed at most, from the start of a capture.")
     warmup_windows: int = Field(default=10, ge=2, description="Windows of warm-up at most, if they never agree.")
     reference: str | None = Field(
-        default="paper-filtering",
+        default_factory=lambda: registry.default("detector.reference"),
         description="Detector that each one is compared with, in alternating blocks; null: none.",
     )
     blocks: int = Field(default=100, ge=8, description="Alternating blocks at least; more give a narrower interval.")

@@ -51,6 +51,7 @@ def _pin() -> int | None:
 
 
 def _measured(spec: dict[str, Any], core: int | None) -> dict[str, Any]:
+    from uwbbench.api import registry
     from uwbbench.api.errors import CaptureError
     from uwbbench.config.source import CaptureRef
     from uwbbench.measure.latency import loops, memory
@@ -85,7 +86,7 @@ def _measured(spec: dict[str, Any], core: int | None) -> dict[str, Any]:
     if compilations:
         notes.append("code was compiled during the timed passes: some times hold that of the compiler")
     instructions, instructions_note = _instructions(pipeline, capture, whole)
-    null = _pipeline(NULL)
+    null = _pipeline({"schema": 1, "name": "idle", "pipeline": [{"use": registry.default("stage.idle")}]})
     loops.warm_up(null, capture, whole, spec["warmup_windows"])
     overhead_us, _, _ = loops.stream_pass(null, capture, whole)
     growth = memory.growth(pipeline, capture, whole)
@@ -188,9 +189,6 @@ def _instructions(pipeline: Pipeline, capture: Capture, whole: Frames) -> tuple[
     with loops.quiet():
         count, note = counted(work)
     return None if count is None else count / len(calls), note
-
-
-NULL = {"schema": 1, "name": "null", "pipeline": [{"use": "reference.nothing"}]}
 
 
 def _pipeline(data: dict[str, Any]) -> Pipeline:

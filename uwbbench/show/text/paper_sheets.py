@@ -61,7 +61,7 @@ def _chain(report: Report) -> Sheet:
     rows = []
     for (detector, dataset), group in counts.groupby(["detector", "dataset"], sort=False):
         left = dict(zip(group["step"], group["count"], strict=True))
-        if steps["peaks"] in left:
+        if next(iter(steps.values())) in left:
             rows.append(
                 (shown(str(detector)), shown(str(dataset)), *(str(left.get(step, "n/a")) for step in steps.values()))
             )

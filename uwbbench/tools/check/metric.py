@@ -12,8 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uwbbench.api.metric import Metric, Outcome
+from uwbbench.api.registry import AuthoredKind
 from uwbbench.measure.accuracy.stats import bootstrap, evaluate, merge
-from uwbbench.tools.check.check import Kind, Nonconformity, check
+from uwbbench.tools.check.check import Nonconformity, check
 from uwbbench.tools.check.subject import ClassSubject
 from uwbbench.tools.check.values import Values
 
@@ -55,7 +56,7 @@ def empty() -> Outcome:
 class MetricSubject(ClassSubject):
     """One metric, and outcomes of twelve captures."""
 
-    kind: ClassVar[Kind] = "metric"
+    kind: ClassVar[AuthoredKind] = "metric"
     base: ClassVar[type] = Metric
 
     @cached_property

@@ -216,7 +216,9 @@ def read_gate(name: str | Path, changes: Mapping[str, Any] | None = None, data_d
         raise ConfigError(f"{source.place(('latency',))}: needs a 'base' that the head is compared with")
     uses = list(model.datasets)
     if model.captures:
-        uses.append(DatasetUse(use="capture", name="captures", params={"files": model.captures}))
+        uses.append(
+            DatasetUse(use=registry.default("dataset.files"), name="captures", params={"files": model.captures})
+        )
     if not uses:
         raise ConfigError(f"{source.name}: no captures: expected 'datasets' or 'captures'")
     datasets = dataset_sources(uses, source, [str(root) for root in data_roots(data_dir, path)])
