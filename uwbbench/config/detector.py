@@ -13,8 +13,9 @@ from uwbbench.api import registry
 from uwbbench.api.check import checked
 from uwbbench.api.errors import ConfigError, PluginError
 from uwbbench.api.locate import find_config
-from uwbbench.api.override import merged, with_values
+from uwbbench.api.override import with_values
 from uwbbench.api.yaml_file import YamlFile, parse_yaml, read_yaml
+from uwbbench.config.extends import extended
 
 IMPLIED = {
     "profile": "profile.minmax",
@@ -145,7 +146,7 @@ def read_detector(
     """
     path = find_config("detectors", name, relative_to)
     source = read_yaml(path)
-    data = _extended(source, path.parent, (path.resolve(),))
+    data = extended(source, "detectors", path)
     if changes:
         data = with_values(data, changes, "--set")
     return check_detector(data, source)
@@ -154,26 +155,7 @@ def read_detector(
 def detector_from_text(text: str, name: str = "detector") -> DetectorConfig:
     """Detector from YAML text, as :func:`read_detector` does from a file."""
     source = parse_yaml(text, name)
-    return check_detector(_extended(source, Path(), ()), source)
-
-
-def _extended(source: YamlFile, folder: Path, seen: tuple[Path, ...]) -> dict[str, Any]:
-    data = dict(source.data)
-    parent = data.get("extends")
-    if parent is None:
-        return data
-    if not isinstance(parent, str):
-        raise ConfigError(f"{source.place(('extends',))}: expected the name or path of a detector, found {parent!r}")
-    path = find_config("detectors", parent, folder)
-    if path.resolve() in seen:
-        raise ConfigError(f"{source.place(('extends',))}: detectors extend each other in a circle")
-    base = _extended(read_yaml(path), path.parent, (*seen, path.resolve()))
-    changes = data.pop("set", None) or {}
-    if not isinstance(changes, dict):
-        raise ConfigError(f"{source.place(('set',))}: expected values by path")
-    base.pop("extends", None)
-    data.pop("extends")
-    return merged(with_values(base, changes, source.place(("set",))), data)
+    return check_detector(extended(source, "detectors"), source)
 
 
 def check_detector(data: Mapping[str, Any], source: YamlFile) -> DetectorConfig:

@@ -107,9 +107,9 @@ def _name_of(gate: Gate) -> str:
 
 
 def _outcome(gate: Gate, rule: AccuracyModel, capture: Capture, found: Detections) -> Outcome:
-    region = gate.model.region
-    where = Region(region.min_range_m, region.max_range_m, region.half_angle_rad)
-    tables = outcomes(found, capture.header, ScoringRules(rule.scoring, gate.model.gate_m, where, gate.model.strongest))
+    region = Region(**gate.model.region.limits)
+    rules = ScoringRules(rule.scoring, gate.model.gate_m, region, gate.model.strongest)
+    tables = outcomes(found, capture.header, rules)
     if rule.table not in tables:
         raise ScoringError(f"capture '{capture.name}': nothing after mapping: the detector does not cluster positions")
     return tables[rule.table]
