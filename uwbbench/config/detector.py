@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -123,6 +125,27 @@ class DetectorConfig:
         """Resolved file as plain values: what a manifest stores and an identity is made of."""
         steps = [{"use": s.use, "as": s.label, "params": s.params, "optional": s.optional} for s in self.steps]
         return {"schema": 1, "name": self.name, "fidelity": self.fidelity, "pipeline": steps}
+
+
+KERNEL = "kernel "
+"""What the names of kernels begin with among the names of sources."""
+
+
+def detector_identity(config: Mapping[str, Any], sources: Mapping[str, str]) -> str:
+    """SHA-256 over a resolved detector and the sources of its stages.
+
+    Parameters
+    ----------
+    config : mapping
+        As :meth:`DetectorConfig.to_dict` gives it.
+    sources : mapping of str to str
+        SHA-256 of the sources of each stage by its name, and of each kernel, which may stand for some, by its name
+        behind ``KERNEL``. Those of other stages do not count.
+    """
+    used = {step["use"]: sources[step["use"]] for step in config["pipeline"]}
+    used |= {name: sha256 for name, sha256 in sources.items() if name.startswith(KERNEL)}
+    text = json.dumps({"detector": config, "sources": used}, sort_keys=True)
+    return hashlib.sha256(text.encode()).hexdigest()
 
 
 def read_detector(
