@@ -1,4 +1,4 @@
-"""Scores of one unit as rows: the same for a fresh run and for scoring it again."""
+"""Rules and scores of a run as it stores them: the same for a fresh run, for scoring it again and for verifying it."""
 
 from __future__ import annotations
 
@@ -8,8 +8,18 @@ from typing import Any
 from uwbbench.api.capture import CaptureHeader
 from uwbbench.api.detections import Detections
 from uwbbench.api.errors import ScoringError
-from uwbbench.measure.accuracy.scoring import ScoringRules, score
+from uwbbench.config.rules import RegionModel
+from uwbbench.measure.accuracy.scoring import Region, ScoringRules, score
 from uwbbench.run.folder.journal import Entry
+
+
+def rules_of(experiment: Mapping[str, Any]) -> tuple[ScoringRules, ...]:
+    """Scoring rules of an experiment as the manifest holds it, one for each scoring."""
+    region = Region(**RegionModel.model_validate(experiment["region"]).limits)
+    return tuple(
+        ScoringRules(scoring, experiment["gate_m"], region, experiment["strongest"])
+        for scoring in experiment["scoring"]
+    )
 
 
 def score_rows(found: Detections, header: CaptureHeader, rules: Iterable[ScoringRules]) -> list[dict[str, Any]]:

@@ -11,11 +11,11 @@ import numpy as np
 from uwbbench.api.detections import Detections
 from uwbbench.api.errors import ScoringError
 from uwbbench.api.metric import Outcome
+from uwbbench.config.rules import IntervalModel
 from uwbbench.detect.pipeline import Pipeline
 from uwbbench.measure.accuracy.metrics.detection import F1
 from uwbbench.measure.accuracy.scoring import ScoringRules, outcomes
 from uwbbench.measure.accuracy.stats import Estimate, bootstrap
-from uwbbench.run.experiment import IntervalModel
 from uwbbench.tools.tune.captures import Labelled
 from uwbbench.tools.tune.sweep.scores import SetScores, set_scores
 from uwbbench.tools.tune.sweep.sweep import Swept
