@@ -76,9 +76,11 @@ class Metric:
         Whether every run shows it; others are shown where an experiment lists them under ``metrics``.
     order : int
         Place among the columns of a table; equal ones stand in the order in which they are listed.
+    brief : bool
+        Whether a default one also stands in tables that must be narrow: in the terminal, and by channel and material.
     headline : int or None
-        Place among the few default ones that are charted, compared in pairs and, the first that can, rank; None: not
-        among them. Listed ones always are, and come first.
+        Place among the few default ones that are charted; the first three of them are compared in pairs, and the first
+        that can ranks. None: not among them. Listed ones always are, and come first.
     """
 
     title: ClassVar[str] = ""
@@ -91,6 +93,7 @@ class Metric:
     needs_exhaustive_truth: ClassVar[bool] = False
     default: ClassVar[bool] = False
     order: ClassVar[int] = 100
+    brief: ClassVar[bool] = True
     headline: ClassVar[int | None] = None
 
     @staticmethod

@@ -136,7 +136,7 @@ def print_leaderboard(report: Report) -> None:
     """Print how the detectors did on each dataset, best first, and what did not work."""
     from uwbbench.show.text.quantity import Quantity, undefined_titles
 
-    quantities = Quantity.of_all(report.metrics)
+    quantities = Quantity.of_all(report.metrics.brief)
     groups: dict[str, list[list[str]]] = {}
     open_world: set[str] = set()
     for about, estimates in report.estimates:

@@ -91,7 +91,10 @@ class ExperimentModel(_Model):
     strongest: int | None = Field(
         default=None, ge=1, description="Score only that many detections of a frame, the strongest."
     )
-    metrics: list[str] = Field(default_factory=list, description="Registered metrics besides the standard ones.")
+    metrics: list[str] = Field(
+        default_factory=list,
+        description="Registered metrics to show besides the default ones; the first ranks, if it has a better end.",
+    )
     latency: LatencyModel = Field(default_factory=LatencyModel)
     stability: bool = Field(default=True, description="Put the hard cases to each detector; see 'uwbbench stability'.")
     seed: int = Field(default=0, ge=0, description="Of the resampling behind the intervals.")

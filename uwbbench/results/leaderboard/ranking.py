@@ -130,7 +130,7 @@ class Ranking:
 
     @property
     def headline(self) -> list[str]:
-        """Names of the few metrics that are charted and compared in pairs."""
+        """Names of the few metrics that stand on the index."""
         return self.metrics.headline(exhaustive=self.exhaustive)
 
     def pair(self, first: str, second: str, metric: str) -> Pair | None:
@@ -163,7 +163,7 @@ def _ranking(suite: Suite, board: Board, members: Mapping[str, list[Scored]]) ->
     exhaustive = all(one.outcome.exhaustive for one in every)
     main = metrics.ranking(exhaustive=exhaustive)
     captures = len({one.capture for one in every})
-    pairs = _pairs(members, metrics, metrics.headline(exhaustive=exhaustive))
+    pairs = _pairs(members, metrics, metrics.compared(exhaustive=exhaustive))
     speeds = speeds_of(suite, board[0])
     complete = {key for key, scored in members.items() if len(scored) == captures}
     ahead: Counter[str] = Counter()

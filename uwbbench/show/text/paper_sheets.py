@@ -21,7 +21,7 @@ def paper_sheets(report: Report) -> Iterator[Sheet]:
     table = report.paper_tables
     if table.empty:
         return
-    quantities = Quantity.of_all(report.metrics)
+    quantities = Quantity.of_all(report.metrics.brief)
     heads = tuple(by.axis for by in quantities.values())
     for kind in table["table"].unique():
         rows = [

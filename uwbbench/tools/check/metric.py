@@ -119,7 +119,7 @@ def display_is_valid(subject: MetricSubject) -> str:
         raise Nonconformity("order and headline as whole numbers, or headline None", f"{cls.order!r}, {cls.headline!r}")
     if not _is_number(cls.margin) or cls.margin < 0:
         raise Nonconformity("a margin of 0 or more", repr(cls.margin))
-    for name in ("default", "needs_exhaustive_truth"):
+    for name in ("default", "brief", "needs_exhaustive_truth"):
         if not isinstance(getattr(cls, name), bool):
             raise Nonconformity(f"{name} as True or False", repr(getattr(cls, name)))
     return f"{cls.title or 'its registered name'}, {decimals} decimals {unit}".rstrip()

@@ -21,6 +21,9 @@ from uwbbench.api.arrays import FloatArray
 from uwbbench.api.errors import PluginError
 from uwbbench.api.metric import Metric, Outcome
 
+MOST_COMPARED = 3
+"""Default headline metrics in which detectors are compared in pairs."""
+
 
 class Absent(Metric):
     """Stands for a metric that is not installed: undefined whatever the outcomes, and shown by its plain name."""
@@ -88,9 +91,18 @@ class MetricChoice(Mapping[str, type[Metric]]):
         """Names of those that have a meaning where the truth is exhaustive, or is not."""
         return self._meaningful(self, exhaustive)
 
+    @property
+    def brief(self) -> dict[str, type[Metric]]:
+        """Those of tables that must be narrow."""
+        return {name: metric for name, metric in self.items() if metric.brief or name in self.listed}
+
     def headline(self, *, exhaustive: bool) -> list[str]:
-        """Names of the few that are charted and compared in pairs."""
+        """Names of the few that are charted."""
         return self._meaningful([*self.listed, *self._leading], exhaustive)
+
+    def compared(self, *, exhaustive: bool) -> list[str]:
+        """Names of those that detectors are compared in, in pairs: headline ones, as there are many pairs."""
+        return self._meaningful([*self.listed, *self._leading[:MOST_COMPARED]], exhaustive)
 
     def ranking(self, *, exhaustive: bool) -> str:
         """Name of the metric that ranks.

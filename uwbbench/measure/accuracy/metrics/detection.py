@@ -154,6 +154,7 @@ class FalseAlarmsPerMinute(Metric):
     needs_exhaustive_truth: ClassVar[bool] = True
     default: ClassVar[bool] = True
     order: ClassVar[int] = 80
+    brief: ClassVar[bool] = False
 
     @staticmethod
     def partial(outcome: Outcome) -> FloatArray:

@@ -81,6 +81,7 @@ class MatchedMeanAbsoluteError(MeanAbsoluteError):
 
     title: ClassVar[str] = "MAE of matches"
     order: ClassVar[int] = 200
+    brief: ClassVar[bool] = False
     headline: ClassVar[int | None] = None
 
     @staticmethod
