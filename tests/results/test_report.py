@@ -84,7 +84,7 @@ def test_intervals_hold_the_value_where_there_are_enough_captures(run: Run) -> N
 def test_too_few_groups_are_said_and_shown_one_by_one(run: Run) -> None:
     text = markdown(Report(run("[oracle]", scoring="frame")))
     assert "No intervals: fewer than 8 groups" in text
-    assert "Recall of each group, oracle: 1.000" in text
+    assert "F1 of each group, oracle: 1.000" in text
 
 
 def test_the_two_tables_of_the_paper_have_a_row_for_each_channel_and_material(run: Run) -> None:

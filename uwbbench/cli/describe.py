@@ -48,7 +48,19 @@ def _plugin(kind: Any, name: str) -> dict[str, Any]:
     elif kind == "terms":
         facts["fidelity"] = cls.fidelity
     else:
-        facts |= {key: getattr(cls, key) for key in ("unit", "better", "merge", "minimum_samples")}
+        shown = (
+            "title",
+            "unit",
+            "better",
+            "margin",
+            "merge",
+            "minimum_samples",
+            "default",
+            "order",
+            "brief",
+            "headline",
+        )
+        facts |= {key: getattr(cls, key) for key in shown}
     if kind != "metrics":
         facts["params"] = parameters(cls.params_type())
     return facts

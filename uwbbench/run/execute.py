@@ -29,7 +29,7 @@ from uwbbench.run.experiment import Experiment
 from uwbbench.run.folder.folder import RunFolder
 from uwbbench.run.folder.identity import accuracy_identity, canonical, latency_identity, plain, stability_name
 from uwbbench.run.folder.journal import Entry
-from uwbbench.run.folder.scored import rules_of, table_of
+from uwbbench.run.folder.scored import rules_of, table_of, with_metrics
 from uwbbench.run.hard_cases import examined
 from uwbbench.run.hard_cases import failed as unexamined
 from uwbbench.run.hard_cases import identity_of as identity_of_cases
@@ -335,4 +335,5 @@ class _Run:
     def _write_scores(self) -> None:
         entries = self.folder.entries()
         rows = {entry.unit: entry.scores for entry in entries if entry.status == "done"}
-        self.folder.write_scores(table_of(entries, rows), self.rules)
+        whole = with_metrics(self.folder, rows, self.rules, self.experiment.metrics)
+        self.folder.write_scores(table_of(entries, whole), self.rules)

@@ -46,7 +46,10 @@ class ExperimentModel(ConfigModel):
     gate_m: GateRadius
     region: RegionModel = Field(default_factory=RegionModel)
     strongest: Strongest
-    metrics: list[str] = Field(default_factory=list, description="Registered metrics besides the standard ones.")
+    metrics: list[str] = Field(
+        default_factory=list,
+        description="Registered metrics to show besides the default ones; the first ranks, if it has a better end.",
+    )
     latency: LatencyModel = Field(default_factory=LatencyModel)
     stability: bool = Field(default=True, description="Put the hard cases to each detector; see 'uwbbench stability'.")
     seed: int = Field(default=0, ge=0, description="Of the resampling behind the intervals.")

@@ -6,9 +6,8 @@ from typing import Literal
 
 from pydantic import Field
 
-from uwbbench.config.model import ConfigModel
-
 from uwbbench.api import registry
+from uwbbench.config.model import ConfigModel
 
 
 class LatencyModel(ConfigModel):

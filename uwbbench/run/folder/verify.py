@@ -16,12 +16,13 @@ import math
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from uwbbench.api.errors import UwbbenchError
 from uwbbench.config.detector import detector_identity
+from uwbbench.measure.accuracy.metrics.choice import MetricChoice
 from uwbbench.run.folder.folder import RunFolder
 from uwbbench.run.folder.identity import (
     accuracy_identity,
@@ -33,7 +34,10 @@ from uwbbench.run.folder.identity import (
     unit_name,
 )
 from uwbbench.run.folder.journal import Entry
-from uwbbench.run.folder.scored import rules_of, score_rows, table_of
+from uwbbench.run.folder.scored import column_of, rules_of, score_rows, table_of, with_metrics
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 RELATIVE, ABSOLUTE = 1e-9, 1e-12
 """Numbers that differ by less are equal: sums may round otherwise on another processor."""
@@ -271,8 +275,10 @@ class _Verifier:
             done = {e.unit for e in self.entries if e.kind == "accuracy" and e.status == "done"}
             if done - set(self.sound):
                 return  # said already: what they would be compared with cannot be made
-            expected = {_key(row): row for row in table_of(self.entries, self.sound)}
-            rows: list[dict[str, Any]] = self.folder.scores().to_dict("records")  # type: ignore[assignment]
+            table = self.folder.scores()
+            whole = with_metrics(self.folder, self.sound, self.folder.rules, self._stored_metrics(table))
+            expected = {_key(row): row for row in table_of(self.entries, whole)}
+            rows: list[dict[str, Any]] = table.to_dict("records")  # type: ignore[assignment]
             stored = {_key(row): row for row in rows}
             for key in sorted({*expected, *stored}):
                 where = "scores.parquet, " + ", ".join(_shown(part) for part in key if part)
@@ -283,6 +289,15 @@ class _Verifier:
                 else:
                     self._same(where, [stored[key]], [expected[key]])
                 self._count("rows of scores")
+
+    def _stored_metrics(self, table: pd.DataFrame) -> list[str]:
+        """Listed metrics that were stored, which version 0.1.0 did not, and are installed."""
+        listed: list[str] = self.manifest["experiment"]["metrics"]
+        metrics = MetricChoice(listed)
+        self.notes += [
+            f"metric {_shown(name)} is not installed: its values were not checked" for name in metrics.absent
+        ]
+        return [name for name in listed if name not in metrics.absent and column_of(name, metrics[name].unit) in table]
 
     def _same(self, where: str, stored: list[Any], again: list[dict[str, Any]]) -> None:
         """Rows that were stored and computed again."""

@@ -23,12 +23,11 @@ from uwbbench.api import registry
 from uwbbench.api.capture import Capture
 from uwbbench.api.detections import Detections
 from uwbbench.api.errors import ScoringError
-from uwbbench.api.metric import Outcome
+from uwbbench.api.metric import Metric, Outcome
 from uwbbench.config.source import CaptureRef
 from uwbbench.measure.accuracy.scoring import Region, ScoringRules, outcomes
 from uwbbench.measure.accuracy.stats import MINIMUM_GROUPS, Estimate, bootstrap, paired_difference
 from uwbbench.run.folder.tables import read_detections
-from uwbbench.show.text.wording import TITLES
 from uwbbench.tools.gate.check import Check, GateVerdict
 from uwbbench.tools.gate.config import AccuracyModel, Gate
 from uwbbench.tools.gate.link import SetUpError, Worker, detect
@@ -81,10 +80,13 @@ def accuracy_check(gate: Gate, rule: AccuracyModel, label: str, found: list[Foun
         If nothing can be said: there is no truth, or the stored run is not what it should be.
     """
     source = ", SIMULATED" if any(one.capture.source == "simulated" for one in found) else ""
-    title = TITLES.get(rule.metric, rule.metric)
+    metric: type[Metric] = registry.load_plugin("metrics", rule.metric)
+    title = metric.title or rule.metric
     name = f"{title} ({rule.scoring} scoring, {rule.table}) on {label}{source}"
-    metric = registry.load_plugin("metrics", rule.metric)
-    blank = Check(kind="accuracy", name=name, verdict=GateVerdict.INVALID, quantity=title, unit=metric.unit)
+    samples = "errors" if metric.merge == "stack" else "frames"
+    blank = Check(
+        kind="accuracy", name=name, verdict=GateVerdict.INVALID, quantity=title, unit=metric.unit, counted=samples
+    )
     outcome = partial(_outcome, gate, rule)
     mine = [outcome(one.capture, one.detections) for one in found]
     settings = {**gate.model.intervals.model_dump(), "seed": gate.model.seed}
@@ -162,8 +164,9 @@ def _compared(check: Check, rule: AccuracyModel, better: str, found: Estimate) -
 def _with(check: Check, found: Estimate) -> Check:
     """Check with a value, its interval and what is behind it."""
     value, low, high = (None if math.isnan(part) else part for part in (found.value, found.low, found.high))
-    counted = f"{'errors' if check.unit == 'm' else 'frames'} in {found.groups} groups"
-    return replace(check, value=value, low=low, high=high, n=found.n, counted=counted)
+    return replace(
+        check, value=value, low=low, high=high, n=found.n, counted=f"{check.counted} in {found.groups} groups"
+    )
 
 
 def _undefined(check: Check, found: Estimate) -> Check:
