@@ -10,8 +10,10 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from uwbbench.api import registry
+from uwbbench.api.text import printable
 from uwbbench.cli import render
-from uwbbench.show.text.sheet import interval, number, shown
+from uwbbench.show.text.numbers import interval, number
+from uwbbench.show.text.sheet import shown
 from uwbbench.show.text.wording import TITLES, scale
 
 if TYPE_CHECKING:
@@ -44,8 +46,7 @@ def _value(value: Any) -> str:
         return "none"
     text = value if isinstance(value, str) else json.dumps(value)
     text = text[:12] if len(text) == 64 and set(text) <= set("0123456789abcdef") else text
-    line = "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
-    return line if len(line) <= LONGEST_VALUE else f"{line[:LONGEST_VALUE]}..."
+    return printable(text, LONGEST_VALUE)
 
 
 def _scores(found: Comparison) -> None:

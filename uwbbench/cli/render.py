@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import json
-import math
 import sys
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import typer
+
+from uwbbench.show.text.numbers import number
 
 if TYPE_CHECKING:
     from uwbbench.results import Report
@@ -20,21 +21,6 @@ NOT_A_TERMINAL_WIDTH = 1000
 def print_json(value: Any) -> None:
     """Print one JSON value and nothing else; undefined numbers must be None already."""
     typer.echo(json.dumps(value, indent=2, allow_nan=False))
-
-
-def number(value: float | None, unit: str = "", digits: int = 3, reason: str = "undefined") -> str:
-    """Number with its unit, or ``n/a`` and why.
-
-    Examples
-    --------
-    >>> number(0.12345, "m")
-    '0.123 m'
-    >>> number(float("nan"), reason="nothing retained")
-    'n/a (nothing retained)'
-    """
-    if value is None or not math.isfinite(value):
-        return f"n/a ({reason})"
-    return f"{value:.{digits}f} {unit}".rstrip()
 
 
 def print_table(title: str, columns: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
@@ -78,7 +64,7 @@ def print_scores(result: Mapping[str, Any]) -> None:
         typer.echo("after mapping: n/a (the detector does not cluster positions)")
     times = result["latency_us"]
     if times is not None:
-        shown = [f"{key} {number(times[key], 'us', 1, 'too few calls')}" for key in _TIMES]
+        shown = [f"{key} {number(times[key], 1, 1.0, 'us', 'too few calls')}" for key in _TIMES]
         typer.echo(f"time a frame, one frame a call ({times['n']} calls): {', '.join(shown)}")
     print_notes(result["notes"])
 
@@ -108,10 +94,8 @@ _SCORES = (
 def _score(block: Mapping[str, Any], key: str, unit: str | None) -> str:
     if unit is None:
         return str(block[key])
-    value = block[key]
-    if unit == "cm":
-        return number(None if value is None else value * 100, unit, 1, reason=_why_undefined(block, key))
-    return number(value, unit, reason=_why_undefined(block, key))
+    digits, scale = (1, 100.0) if unit == "cm" else (3, 1.0)
+    return number(block[key], digits, scale, unit, _why_undefined(block, key))
 
 
 def _why_undefined(block: Mapping[str, Any], key: str) -> str:
@@ -147,8 +131,8 @@ def print_leaderboard(report: Report) -> None:
         title = f"{about['dataset']}, {about['source'].upper()}"
         if not about["exhaustive"]:
             open_world.add(title)
-        numbers = [_short(found[name].value * scale, digits) for name, _, scale, digits in _LEADERBOARD]
-        others = [_short(about["p50_us"], 0), _short(about["chance_recall"], 3)]
+        numbers = [number(found[name].value, digits, scale) for name, _, scale, digits in _LEADERBOARD]
+        others = [number(about["p50_us"], 0), number(about["chance_recall"], 3)]
         groups.setdefault(title, []).append([about["scoring"], about["table"], about["detector"], *numbers, *others])
     columns = ["scoring", "after", "detector", *(title for _, title, _, _ in _LEADERBOARD), "p50 (us)", "chance recall"]
     for title, rows in groups.items():
@@ -178,7 +162,3 @@ _LEADERBOARD = (
     ("p95", "P95 (cm)", 100, 1),
     ("sd", "SD (cm)", 100, 1),
 )
-
-
-def _short(value: float, digits: int) -> str:
-    return f"{value:.{digits}f}" if math.isfinite(value) else "n/a"

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
-import inspect
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
+
+from uwbbench.api.text import summary
 
 if TYPE_CHECKING:
     from uwbbench.measure.robustness.subject import Subject
@@ -129,8 +130,7 @@ def case(expectation: Expectation) -> Callable[[Callable[[Subject], Evidence]], 
     """Make a case of a function, named like it; the first paragraph of its docstring states what is expected."""
 
     def made(check: Callable[[Subject], Evidence]) -> Case:
-        statement = " ".join(inspect.cleandoc(check.__doc__ or "").partition("\n\n")[0].split())
         group = check.__module__.rpartition(".")[2]
-        return Case(check.__name__.replace("_", "-"), group, expectation, statement, check)
+        return Case(check.__name__.replace("_", "-"), group, expectation, summary(check.__doc__), check)
 
     return made

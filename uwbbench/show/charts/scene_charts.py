@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 
 import numpy as np
@@ -11,6 +10,7 @@ from uwbbench.api.arrays import FloatArray
 from uwbbench.results.cases import Case
 from uwbbench.show.charts.chart import Spec, axis, chart, limits
 from uwbbench.show.charts.theme import SERIES
+from uwbbench.show.text.numbers import rounded
 
 NEAR = {True: "within the gate", False: "elsewhere"}
 
@@ -135,4 +135,4 @@ def _nearness() -> Spec:
 
 def _nulls(values: FloatArray) -> list[float | None]:
     """Values as JSON holds them; None where there is none, which breaks a line."""
-    return [float(f"{value:.5g}") if math.isfinite(value) else None for value in values.tolist()]
+    return [rounded(value) for value in values.tolist()]

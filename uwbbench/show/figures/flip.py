@@ -17,6 +17,7 @@ from uwbbench.results import radargram
 from uwbbench.results.comparison.flips import Flip
 from uwbbench.results.delay import delay_of_range, zero_tap
 from uwbbench.show.figures import style
+from uwbbench.show.text.numbers import number
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -63,7 +64,7 @@ def draw_flip(flip: Flip, region: Region, roots: Sequence[Path]) -> tuple[Figure
 
 
 def _errors(flip: Flip) -> str:
-    told = ["nothing" if np.isnan(e) else f"{100 * e:.1f} cm" for e in (flip.error_before_m, flip.error_after_m)]
+    told = ["nothing" if np.isnan(e) else number(e, 1, 100.0, "cm") for e in (flip.error_before_m, flip.error_after_m)]
     return f"Largest error before: {told[0]}; after: {told[1]}."
 
 

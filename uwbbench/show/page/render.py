@@ -21,11 +21,10 @@ from uwbbench.show.charts.theme import PAGE, PRINT
 from uwbbench.show.page.content import Content
 from uwbbench.show.text.formats import INDEX, MARK
 from uwbbench.show.text.report import Tables
-from uwbbench.show.text.sheet import shown
+from uwbbench.show.text.sheet import sentence, shown
 
 NEEDS = "the HTML report and its figures need vl-convert and Jinja2; install them with: pip install 'uwbbench[report]'"
 FIGURE_WIDTH = 620
-LONGEST_TEXT = 600
 
 
 class ReportToolsError(UwbbenchError):
@@ -58,7 +57,7 @@ def page(content: Content) -> str:
         name=name,
         kind=_kind(content),
         simulated=simulated,
-        description=_cut(" ".join(report.experiment["description"].split())),
+        description=sentence(report.experiment["description"]),
         sections=_sections(content, tables),
         summary=content.summary(),
         counts=_counts(content),
@@ -69,7 +68,7 @@ def page(content: Content) -> str:
         looks=content.looks,
         tables=tables,
         latencies=content.timings,
-        notes=[_cut(note) for note in report.notes],
+        notes=[sentence(note) for note in report.notes],
         facts=_facts(session, report.experiment),
         manifest=json.dumps(manifest, indent=2, ensure_ascii=False),
         made=f"Made by uwbbench {session['versions']['uwbbench']} from a run started {session['started']}.",
@@ -149,10 +148,6 @@ def _kind(content: Content) -> str:
     )
 
 
-def _cut(text: str) -> str:
-    return text if len(text) <= LONGEST_TEXT else f"{text[:LONGEST_TEXT]}…"
-
-
 def _counts(content: Content) -> str:
     report = content.report
     captures = report.captures
@@ -193,7 +188,7 @@ def _facts(session: dict[str, Any], experiment: dict[str, Any]) -> list[tuple[st
     region = {key: value for key, value in experiment["region"].items() if value is not None}
     return [
         ("started", session["started"]),
-        ("command", _cut(" ".join(session["command"]))),
+        ("command", sentence(" ".join(session["command"]))),
         ("machine", f"{machine['cpu']}, {machine['usable_cores']} cores, {machine['os']}"),
         ("versions", ", ".join(f"{name} {number}" for name, number in versions.items())),
         ("scoring", f"{', '.join(experiment['scoring'])}; gate {100 * experiment['gate_m']:g} cm"),

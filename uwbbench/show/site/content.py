@@ -16,15 +16,14 @@ from uwbbench.results.leaderboard.runs import Run
 from uwbbench.results.leaderboard.suites import Suite
 from uwbbench.show.site import charts
 from uwbbench.show.site.names import Names
+from uwbbench.show.text.numbers import between, interval, number, p_value
 from uwbbench.show.text.quantity import Quantity
-from uwbbench.show.text.sheet import interval, number, shown
+from uwbbench.show.text.sheet import sentence, shown
 from uwbbench.show.text.wording import TABLES
 
 SHOWN = ("f1", "recall", "precision", "mae", "p95", "false_alarms_per_minute")
 SHOWN_FIRST = ("f1", "recall", "mae", "p95")
 """Metrics of a board on its own page, and on the index."""
-
-LONGEST_TEXT = 600
 
 VERDICTS = {
     "differs": "differ",
@@ -177,7 +176,7 @@ class Content:
             return Cell("n/a")
         word = {"differs": "worse" if pair.better == pair.second else "better", "equal": "equal"}.get(pair.verdict)
         difference = pair_text(pair)
-        return Cell(word or pair.verdict, small=difference, title=f"adjusted p {p_text(pair.adjusted)}")
+        return Cell(word or pair.verdict, small=difference, title=f"adjusted p {p_value(pair.adjusted)}")
 
     @staticmethod
     def _board_notes(ranking: Ranking) -> Iterator[str]:
@@ -239,7 +238,16 @@ class Content:
             names = [Cell(self.names.detectors[key]) for key in (pair.first, pair.second)]
             counts = [Cell(str(pair.captures)), Cell(str(pair.difference.groups))]
             verdict = Cell(VERDICTS[pair.verdict])
-            rows.append((*names, Cell(by.title), pair_cell(pair), Cell(p_text(pair.adjusted)), verdict, *counts))
+            rows.append(
+                (
+                    *names,
+                    Cell(by.title),
+                    pair_cell(pair),
+                    Cell(p_value(pair.adjusted)),
+                    verdict,
+                    *counts,
+                )
+            )
         columns = ("first", "second", "metric", "difference", "adjusted p", "verdict", "captures", "groups (n)")
         return Table("Compared in pairs", columns, tuple(rows))
 
@@ -255,7 +263,7 @@ class Content:
             ),
             ("scoring", f"{', '.join(rule.scoring for rule in rules)}; gate {100 * rules[0].gate_m:g} cm"),
             ("runs", ", ".join(shown(run.name) for run in suite.runs)),
-            ("machines", "; ".join(line(machine) for machine in machines)),
+            ("machines", "; ".join(sentence(machine) for machine in machines)),
             ("reference of times", "none" if reference is None else shown(reference[0])),
         ]
 
@@ -330,8 +338,7 @@ def quantity(name: str) -> Quantity:
 def metric_cell(by: Quantity, estimate: Estimate) -> Cell:
     """Value with its interval below."""
     text = number(estimate.value, by.digits, by.factor)
-    whole = interval(estimate.value, estimate.low, estimate.high, by.digits, by.factor)
-    ends = whole.removeprefix(text).strip()
+    ends = between(estimate.low, estimate.high, by.digits, by.factor)
     return Cell(text, small=ends, key=_key(estimate.value), title=by.told(estimate))
 
 
@@ -340,9 +347,7 @@ def speed_cell(one: Standing) -> Cell:
     speed = one.speed
     if speed is None:
         return Cell("not timed", key="n/a")
-    whole = interval(speed.ratio, speed.low, speed.high, 2)
-    text = number(speed.ratio, 2)
-    return Cell(text, small=whole.removeprefix(text).strip(), key=_key(speed.ratio))
+    return Cell(number(speed.ratio, 2), small=between(speed.low, speed.high, 2), key=_key(speed.ratio))
 
 
 def pair_text(pair: Pair) -> str:
@@ -355,25 +360,6 @@ def pair_text(pair: Pair) -> str:
 def pair_cell(pair: Pair) -> Cell:
     """Difference of a pair."""
     return Cell(pair_text(pair), key=_key(pair.difference.value))
-
-
-def p_text(value: float) -> str:
-    """A p-value; never rounded to 0.
-
-    Examples
-    --------
-    >>> p_text(0.0002), p_text(0.0312)
-    ('<0.001', '0.031')
-    """
-    if math.isnan(value):
-        return "n/a"
-    return "<0.001" if value < 0.001 else f"{value:.3f}"
-
-
-def line(text: str) -> str:
-    """Text on one line, without control characters, cut where it is very long."""
-    whole = "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in " ".join(text.split()))
-    return whole if len(whole) <= LONGEST_TEXT else f"{whole[:LONGEST_TEXT]}..."
 
 
 def _key(value: float) -> str:

@@ -17,13 +17,12 @@ from uwbbench.show.site.content import (
     Content,
     Section,
     Table,
-    line,
     metric_cell,
-    p_text,
     pair_cell,
     quantity,
 )
-from uwbbench.show.text.sheet import interval, number, shown
+from uwbbench.show.text.numbers import interval, number, p_value
+from uwbbench.show.text.sheet import sentence, shown
 from uwbbench.show.text.wording import TABLES
 
 
@@ -179,9 +178,9 @@ def _captures(section: Section) -> Table:
             else [
                 str(len(header)),
                 "none" if header.radar.channel is None else str(header.radar.channel),
-                line(header.license),
-                line(header.citation),
-                line(header.description),
+                sentence(header.license),
+                sentence(header.citation),
+                sentence(header.description),
             ]
         )
         rows.append(tuple(Cell(text) for text in (shown(capture), *about, sha256[:12] or "not opened by any run")))
@@ -261,7 +260,12 @@ def _others(content: Content, contender: Contender, sections: list[Section]) -> 
                 word = VERDICTS[pair.verdict]
                 if pair.better is not None:
                     word = "better" if pair.better == contender.key else "worse"
-                cells = (Cell(quantity(name).title), pair_cell(pair), Cell(p_text(pair.adjusted)), Cell(word))
+                cells = (
+                    Cell(quantity(name).title),
+                    pair_cell(pair),
+                    Cell(p_value(pair.adjusted)),
+                    Cell(word),
+                )
                 rows.append((content.detector_cell(one), *cells, Cell(str(pair.captures))))
         columns = ("other detector", "metric", "difference: this one minus the other", "adjusted p", "this one is")
         yield Table(f"{section.title}, {ranking.board[2]} scoring", (*columns, "captures"), tuple(rows))
@@ -273,7 +277,7 @@ def _times(content: Content, mine: list[tuple[Suite, Contender]]) -> Table:
         for dataset in suite.datasets:
             for machine, speed in speeds_by_machine(suite, contender, dataset).items():
                 ratio = interval(speed.ratio, speed.low, speed.high, 3)
-                about = (line(machine), content.names.suite(suite), shown(dataset), shown(speed.reference))
+                about = (sentence(machine), content.names.suite(suite), shown(dataset), shown(speed.reference))
                 times = (
                     Cell(ratio, key=f"{speed.ratio:.6g}"),
                     Cell(number(speed.p50_us, 0)),
@@ -292,16 +296,16 @@ def _failures(mine: list[tuple[Suite, Contender]]) -> Table:
             reasons = [entry.reason] if entry.status == "failed" else []
             reasons += [f"{row['scoring']}: {row['reason']}" for row in entry.scores if row["status"] == "unscored"]
             about = (suite.name, entry.dataset, entry.capture, run.name)
-            rows += [tuple(Cell(line(text)) for text in (*about, reason)) for reason in reasons]
+            rows += [tuple(Cell(sentence(text)) for text in (*about, reason)) for reason in reasons]
     return Table("Failed or not scored", ("suite", "dataset", "capture", "run", "reason"), tuple(rows))
 
 
 def _notes(mine: list[tuple[Suite, Contender]]) -> Iterator[str]:
     for _, contender in mine:
-        yield from (line(text) for text in contender.disagreements)
+        yield from (sentence(text) for text in contender.disagreements)
         hard = contender.stability
         if hard is not None and "refused" in hard:
-            yield f"It refuses the capture of the hard cases: {line(hard['refused'])}"
+            yield f"It refuses the capture of the hard cases: {sentence(hard['refused'])}"
         elif hard is not None:
             yield (
                 f"Hard cases (SIMULATED): {hard['passed']} passed, {hard['failed']} failed, "
@@ -312,7 +316,7 @@ def _notes(mine: list[tuple[Suite, Contender]]) -> Iterator[str]:
 def _facts(mine: list[tuple[Suite, Contender]]) -> Iterator[tuple[str, str]]:
     contender = mine[0][1]
     newest = contender.runs[-1]
-    yield "name", line(contender.name)
+    yield "name", sentence(contender.name)
     yield "identity", contender.identity
     yield "fidelity", str(contender.config["fidelity"])
     yield "runs", ", ".join(dict.fromkeys(shown(run.name) for _, one in mine for run in one.runs))
@@ -334,7 +338,7 @@ def _runs(content: Content) -> Page:
             shown(run.name),
             content.names.suite(suite),
             run.started,
-            "; ".join(line(machine) for machine in run.machines),
+            "; ".join(sentence(machine) for machine in run.machines),
             f"uwbbench {shown(versions['uwbbench'])}, numpy {shown(versions['numpy'])}",
             str(len(run.manifest["detectors"])),
             f"{len(run.entries) - failed} done, {failed} failed",
@@ -343,7 +347,7 @@ def _runs(content: Content) -> Page:
         rows.append(tuple(map(Cell, cells)))
     columns = ("run", "suite", "started", "machine", "versions", "detectors", "units", "verified")
     failures = [
-        tuple(Cell(line(text)) for text in (run.name, entry.kind, entry.detector, entry.dataset, entry.reason))
+        tuple(Cell(sentence(text)) for text in (run.name, entry.kind, entry.detector, entry.dataset, entry.reason))
         for run in content.runs
         for entry in run.entries
         if entry.status == "failed" and entry.kind != "accuracy"

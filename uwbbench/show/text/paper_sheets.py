@@ -6,7 +6,8 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from uwbbench.results import published
-from uwbbench.show.text.sheet import Sheet, interval, number, shown
+from uwbbench.show.text.numbers import interval, number
+from uwbbench.show.text.sheet import Sheet, shown
 from uwbbench.show.text.wording import TABLES, TITLES, scale
 
 if TYPE_CHECKING:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from uwbbench.api.metric import Metric
 from uwbbench.measure.accuracy.stats import Estimate
-from uwbbench.show.text.sheet import interval
+from uwbbench.show.text.numbers import interval
 from uwbbench.show.text.wording import TITLES, scale
 
 

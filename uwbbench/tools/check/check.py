@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
-import inspect
 import traceback
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
 from uwbbench.api.errors import UwbbenchError
+from uwbbench.api.text import summary
 
 if TYPE_CHECKING:
     from uwbbench.tools.check.subject import Subject
@@ -132,8 +132,7 @@ def check(read_more: str) -> Callable[[Callable[[Any], str | None]], Check]:
     """
 
     def made(run: Callable[[Any], str | None]) -> Check:
-        statement = " ".join(inspect.cleandoc(run.__doc__ or "").partition("\n\n")[0].split())
         command = read_more if " " in read_more else f"python -m pydoc {read_more}"
-        return Check(run.__name__.replace("_", "-"), statement, command, run)
+        return Check(run.__name__.replace("_", "-"), summary(run.__doc__), command, run)
 
     return made

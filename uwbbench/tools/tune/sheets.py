@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from uwbbench.show.text.sheet import Sheet, escaped, interval, number, shown
+from uwbbench.api.text import one_line
+from uwbbench.show.text.numbers import interval, number
+from uwbbench.show.text.sheet import Sheet, escaped, shown
 from uwbbench.tools.tune.evaluate import Result
 from uwbbench.tools.tune.execute import TuneOutcome
 
@@ -81,7 +83,7 @@ def markdown(outcome: TuneOutcome) -> str:
     """All tables as Markdown."""
     lines = [f"# {escaped(shown(outcome.tuning.name))}", ""]
     if outcome.tuning.model.description:
-        lines += [escaped(" ".join(outcome.tuning.model.description.split())), ""]
+        lines += [escaped(one_line(outcome.tuning.model.description)), ""]
     return "\n".join([*lines, *(sheet.markdown() for sheet in sheets(outcome))])
 
 
