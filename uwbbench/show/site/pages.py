@@ -10,6 +10,7 @@ from typing import Any
 from uwbbench.measure.accuracy.stats import MINIMUM_GROUPS
 from uwbbench.results.leaderboard.ranking import COMPARED, MARGINS, SETTINGS, SIGNIFICANCE, speeds_by_machine
 from uwbbench.results.leaderboard.suites import Contender, Suite
+from uwbbench.show.html.render import badge
 from uwbbench.show.site.content import (
     SHOWN_FIRST,
     VERDICTS,
@@ -109,11 +110,6 @@ def pages(content: Content) -> Iterator[Page]:
     yield _runs(content)
 
 
-def _badge(sources: set[str]) -> str:
-    kinds = {frozenset({"simulated"}): "SIMULATED", frozenset({"measured"}): "MEASURED", frozenset(): "NO RESULT"}
-    return kinds.get(frozenset(sources), "MEASURED AND SIMULATED")
-
-
 def _index(content: Content) -> Page:
     parts = []
     for suite in content.suites:
@@ -141,7 +137,7 @@ def _index(content: Content) -> Page:
     lead = f"{detectors} detectors in {len(content.runs)} verified runs. "
     lead += "Only what was measured on the same captures under the same scoring rules is compared."
     parts.append(Part("How to read it", notes=HOW))
-    return Page("index.html", "Leaderboard", _badge({one.source for one in content.sections}), lead, tuple(parts))
+    return Page("index.html", "Leaderboard", badge({one.source for one in content.sections}), lead, tuple(parts))
 
 
 def _dataset(content: Content, section: Section) -> Page:
@@ -163,7 +159,7 @@ def _dataset(content: Content, section: Section) -> Page:
     facts = Part("What was compared", facts=tuple(content.suite_facts(suite)), tables=(_captures(section),))
     lead = f"Dataset of {content.names.suite(suite)}."
     parts = (first, *boards, facts, Part("How to read it", notes=HOW))
-    return Page(section.address, section.label, _badge({section.source}), lead, parts)
+    return Page(section.address, section.label, badge({section.source}), lead, parts)
 
 
 def _captures(section: Section) -> Table:
@@ -224,7 +220,7 @@ def _detector(content: Content, contender: Contender) -> Page:
     ]
     versions = f" Other versions of the same name: {', '.join(dict.fromkeys(others))}." if others else ""
     lead = f"Identity {contender.identity[:12]}: steps, parameters and sources.{versions}"
-    return Page(content.names.detector_page(contender), label, _badge({s.source for s in sections}), lead, tuple(parts))
+    return Page(content.names.detector_page(contender), label, badge({s.source for s in sections}), lead, tuple(parts))
 
 
 def _results(content: Content, contender: Contender, sections: list[Section]) -> Table:
@@ -361,4 +357,4 @@ def _runs(content: Content) -> Page:
         "Every run was verified before anything was taken from it: files against their hashes, names and identities "
         "against the manifest, scores against the stored detections. Detections themselves are taken as they are."
     )
-    return Page("runs.html", "Runs", _badge({one.source for one in content.sections}), lead, parts)
+    return Page("runs.html", "Runs", badge({one.source for one in content.sections}), lead, parts)

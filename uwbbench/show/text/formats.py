@@ -23,6 +23,7 @@ from uwbbench.api.text import one_line
 from uwbbench.results.report import Report
 from uwbbench.run.folder.files import write_json, write_text
 from uwbbench.run.folder.identity import plain
+from uwbbench.show.extras import report_tools
 from uwbbench.show.text.report import sheets
 from uwbbench.show.text.sheet import Sheet
 
@@ -120,12 +121,16 @@ def _cell(value: Any) -> str:
 
 
 def latex(report: Report) -> str:
-    """Every table for LaTeX; the preamble needs ``booktabs``, ``textcomp`` and T1 fonts."""
-    lines = [
-        f"% {MARK}; needs \\usepackage{{booktabs}} and \\usepackage[T1]{{fontenc}}",
-        *(_latex_table(sheet) for sheet in sheets(report)),
-    ]
-    return "\n".join(lines) + "\n"
+    """Every table for LaTeX; the preamble needs ``booktabs``, ``textcomp`` and T1 fonts.
+
+    Raises
+    ------
+    ReportToolsError
+        If Jinja2, which pandas writes tables with, is not installed.
+    """
+    with report_tools():
+        tables = [_latex_table(sheet) for sheet in sheets(report)]
+    return "\n".join((f"% {MARK}; needs \\usepackage{{booktabs}} and \\usepackage[T1]{{fontenc}}", *tables, ""))
 
 
 def _latex_table(sheet: Sheet) -> str:
