@@ -7,7 +7,6 @@ import json
 from collections.abc import Iterator
 from dataclasses import dataclass, field, fields
 from functools import cached_property
-from importlib import import_module
 from typing import Any, Literal, Protocol, runtime_checkable
 
 import numpy as np
@@ -89,7 +88,9 @@ class CaptureHeader:
         return f"{type(self).__name__}({self.name!r}, {self.source}: {size})"
 
     def _repr_html_(self) -> str:
-        return str(import_module("uwbbench.show.notebook").capture(self))
+        from uwbbench.show.notebook.capture import capture
+
+        return capture(self)
 
     @property
     def duration_s(self) -> float:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -169,7 +168,9 @@ class Detections:
         return f"Detections({len(self)} in {len(self.processed)} frames: {', '.join(self.columns)})"
 
     def _repr_html_(self) -> str:
-        return str(import_module("uwbbench.show.notebook").detections(self))
+        from uwbbench.show.notebook.detections import detections
+
+        return detections(self)
 
     def __contains__(self, column: str) -> bool:
         return column in self.columns

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from importlib import import_module
 
 import numpy as np
 
@@ -99,7 +98,9 @@ class Truth:
         return f"Truth({len(self.objects)} objects, {'exhaustive' if self.exhaustive else 'not exhaustive'})"
 
     def _repr_html_(self) -> str:
-        return str(import_module("uwbbench.show.notebook").truth(self))
+        from uwbbench.show.notebook.capture import truth
+
+        return truth(self)
 
     def seen_from(self, radar: Radar, trajectory: Trajectory) -> Sight:
         """Range and azimuth of every object from every pose of the receiver.

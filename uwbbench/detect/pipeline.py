@@ -7,7 +7,6 @@ import hashlib
 import json
 from collections.abc import Iterator, Mapping
 from functools import cache
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -61,7 +60,9 @@ class Pipeline:
         return f"Pipeline({self.name}: {' -> '.join(step.label for step in self.config.steps)})"
 
     def _repr_html_(self) -> str:
-        return str(import_module("uwbbench.show.notebook").detector(self))
+        from uwbbench.show.notebook.detector import detector
+
+        return detector(self)
 
     def _check_ports(self) -> None:
         available = {"frames"}

@@ -11,7 +11,6 @@ import dataclasses
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from importlib import import_module
 from typing import Any, get_args
 
 from uwbbench.api.capture import CaptureHeader
@@ -121,7 +120,9 @@ class Scores:
         return f"Scores({rules.scoring}, gate {rules.gate_m:g} m: {counts}, F1 {block.f1:.3f}, MAE {block.mae_m:.3f} m)"
 
     def _repr_html_(self) -> str:
-        return str(import_module("uwbbench.show.notebook").scores(self))
+        from uwbbench.show.notebook.scores import scores
+
+        return scores(self)
 
     def __getitem__(self, table: str) -> ScoreBlock | None:
         if table not in get_args(Table):
