@@ -88,9 +88,9 @@ class CaptureHeader:
         return f"{type(self).__name__}({self.name!r}, {self.source}: {size})"
 
     def _repr_html_(self) -> str:
-        from uwbbench.show import notebook
+        from uwbbench.show.notebook.capture import capture
 
-        return notebook.capture(self)
+        return capture(self)
 
     @property
     def duration_s(self) -> float:

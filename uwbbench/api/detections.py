@@ -168,9 +168,9 @@ class Detections:
         return f"Detections({len(self)} in {len(self.processed)} frames: {', '.join(self.columns)})"
 
     def _repr_html_(self) -> str:
-        from uwbbench.show import notebook
+        from uwbbench.show.notebook.detections import detections
 
-        return notebook.detections(self)
+        return detections(self)
 
     def __contains__(self, column: str) -> bool:
         return column in self.columns

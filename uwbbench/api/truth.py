@@ -98,9 +98,9 @@ class Truth:
         return f"Truth({len(self.objects)} objects, {'exhaustive' if self.exhaustive else 'not exhaustive'})"
 
     def _repr_html_(self) -> str:
-        from uwbbench.show import notebook
+        from uwbbench.show.notebook.capture import truth
 
-        return notebook.truth(self)
+        return truth(self)
 
     def seen_from(self, radar: Radar, trajectory: Trajectory) -> Sight:
         """Range and azimuth of every object from every pose of the receiver.

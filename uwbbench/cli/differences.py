@@ -9,9 +9,11 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
+from uwbbench.api.text import printable
 from uwbbench.cli import render
+from uwbbench.show.text.numbers import interval, number
 from uwbbench.show.text.quantity import Quantity
-from uwbbench.show.text.sheet import interval, number, shown
+from uwbbench.show.text.sheet import shown
 
 if TYPE_CHECKING:
     from uwbbench.results.comparison import Comparison
@@ -43,8 +45,7 @@ def _value(value: Any) -> str:
         return "none"
     text = value if isinstance(value, str) else json.dumps(value)
     text = text[:12] if len(text) == 64 and set(text) <= set("0123456789abcdef") else text
-    line = "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
-    return line if len(line) <= LONGEST_VALUE else f"{line[:LONGEST_VALUE]}..."
+    return printable(text, LONGEST_VALUE)
 
 
 def _scores(found: Comparison) -> None:

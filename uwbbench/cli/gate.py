@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from uwbbench.api.errors import StoreError
+from uwbbench.api.text import one_line
 from uwbbench.cli import options, render
 
 if TYPE_CHECKING:
@@ -67,7 +68,7 @@ def _append(path: Path, text: str) -> None:
 
 
 def _print(result: GateResult) -> None:
-    from uwbbench.tools.gate.publish import COLUMNS, one_line, rows
+    from uwbbench.tools.gate.publish import COLUMNS, rows
 
     render.print_table(f"gate {one_line(result.gate)}", COLUMNS, rows(result))
     render.print_facts({"head": one_line(result.head), "base": one_line(result.base)})

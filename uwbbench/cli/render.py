@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import json
-import math
 import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import typer
+
+from uwbbench.show.text.numbers import number
 
 if TYPE_CHECKING:
     from uwbbench.api.metric import Metric
@@ -21,21 +22,6 @@ NOT_A_TERMINAL_WIDTH = 1000
 def print_json(value: Any) -> None:
     """Print one JSON value and nothing else; undefined numbers must be None already."""
     typer.echo(json.dumps(value, indent=2, allow_nan=False))
-
-
-def number(value: float | None, unit: str = "", digits: int = 3, reason: str = "undefined") -> str:
-    """Number with its unit, or ``n/a`` and why.
-
-    Examples
-    --------
-    >>> number(0.12345, "m")
-    '0.123 m'
-    >>> number(float("nan"), reason="nothing retained")
-    'n/a (nothing retained)'
-    """
-    if value is None or not math.isfinite(value):
-        return f"n/a ({reason})"
-    return f"{value:.{digits}f} {unit}".rstrip()
 
 
 def print_table(title: str, columns: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
@@ -79,7 +65,7 @@ def print_scores(result: Mapping[str, Any]) -> None:
         typer.echo("after mapping: n/a (the detector does not cluster positions)")
     times = result["latency_us"]
     if times is not None:
-        shown = [f"{key} {number(times[key], 'us', 1, 'too few calls')}" for key in _TIMES]
+        shown = [f"{key} {number(times[key], 1, 1.0, 'us', 'too few calls')}" for key in _TIMES]
         typer.echo(f"time a frame, one frame a call ({times['n']} calls): {', '.join(shown)}")
     print_notes(result["notes"])
 
@@ -101,7 +87,7 @@ def _scores(blocks: Sequence[Mapping[str, Any]]) -> Iterator[tuple[str, list[str
                 by.title,
                 [text or f"n/a ({_why_undefined(metric, block)})" for text, block in zip(texts, blocks, strict=True)],
             )
-    yield "recall by chance", [number(block["chance_recall"], reason="not defined here") for block in blocks]
+    yield "recall by chance", [number(block["chance_recall"], 3, reason="not defined here") for block in blocks]
     for key, title in _COUNTS.items():
         yield title, [str(block[key]) for block in blocks]
 
@@ -143,8 +129,8 @@ def print_leaderboard(report: Report) -> None:
         title = f"{about['dataset']}, {about['source'].upper()}"
         if not about["exhaustive"]:
             open_world.add(title)
-        numbers = [_short(by.scaled(estimates[name].value), by.digits) for name, by in quantities.items()]
-        others = [_short(about["p50_us"], 0), _short(about["chance_recall"], 3)]
+        numbers = [number(estimates[name].value, by.digits, by.factor) for name, by in quantities.items()]
+        others = [number(about["p50_us"], 0), number(about["chance_recall"], 3)]
         groups.setdefault(title, []).append([about["scoring"], about["table"], about["detector"], *numbers, *others])
     heads = [by.axis for by in quantities.values()]
     columns = ["scoring", "after", "detector", *heads, "p50 (us)", "chance recall"]
@@ -165,7 +151,3 @@ def print_leaderboard(report: Report) -> None:
     print_notes(report.notes)
     if failed or unscored:
         typer.echo(f"{failed} units failed, {unscored} could not be scored", err=True)
-
-
-def _short(value: float, digits: int) -> str:
-    return f"{value:.{digits}f}" if math.isfinite(value) else "n/a"

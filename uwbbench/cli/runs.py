@@ -227,7 +227,7 @@ def rescore(
 def _conclude(folder: RunFolder, data_dir: Path | None, *, json: bool) -> None:
     """Write the report into the run folder, as Markdown and as a page, and show its leaderboard."""
     from uwbbench.results import Report, read_safely
-    from uwbbench.show.page import ReportToolsError
+    from uwbbench.show.extras import ReportToolsError
     from uwbbench.show.text import formats, write_report
 
     with read_safely(folder.path):

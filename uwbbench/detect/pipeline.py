@@ -58,9 +58,9 @@ class Pipeline:
         return f"Pipeline({self.name}: {' -> '.join(step.label for step in self.config.steps)})"
 
     def _repr_html_(self) -> str:
-        from uwbbench.show import notebook
+        from uwbbench.show.notebook.detector import detector
 
-        return notebook.detector(self)
+        return detector(self)
 
     def _check_ports(self) -> None:
         available = {"frames"}

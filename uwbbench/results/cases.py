@@ -24,6 +24,7 @@ from uwbbench.measure.accuracy.judge import Scene
 from uwbbench.measure.accuracy.metrics.choice import MetricChoice
 from uwbbench.measure.accuracy.scoring import ScoringRules
 from uwbbench.measure.accuracy.stats import evaluate
+from uwbbench.results.ground_truth import Outline, TrueRange, outlines, true_ranges
 from uwbbench.results.results import Scored
 from uwbbench.run.folder.folder import RunFolder
 from uwbbench.run.folder.journal import Entry
@@ -76,11 +77,10 @@ class Case:
     header : CaptureHeader
     time_s : (shown,) array
         Time of the shown frames, since the first.
-    range_m : (shown, obstacles) array
-        True range of each obstacle; NaN where it is hidden or outside the sector that scores look at.
-    obstacles : tuple of str
+    ranges : list of TrueRange
+        Of each obstacle in the shown frames.
     path_m : (shown, 2) array
-    outlines_m : list of (name, structure, (vertices, 2) array)
+    outlines : list of Outline
     marks : list of Marks
     """
 
@@ -94,10 +94,9 @@ class Case:
     score: float
     header: CaptureHeader
     time_s: FloatArray
-    range_m: FloatArray
-    obstacles: tuple[str, ...]
+    ranges: list[TrueRange]
     path_m: FloatArray
-    outlines_m: list[tuple[str, bool, FloatArray]]
+    outlines: list[Outline]
     marks: list[Marks]
 
 
@@ -151,42 +150,28 @@ def _case(folder: RunFolder, entries: Sequence[Entry], rule: ScoringRules, score
     header = folder.header(capture_id)
     shown = _thinned(len(header))
     since_s = header.trajectory.timestamp_s - header.trajectory.timestamp_s[:1]
-    things = header.truth.objects if header.truth is not None else ()
-    columns = [column for column, thing in enumerate(things) if not thing.structure]
     marks = []
-    range_m = np.empty((len(shown), 0))
     for entry in entries:
         found = folder.detections(entry.unit)
         scene = Scene.of(found, header)
-        visible = scene.visible(rule.region)
-        range_m = np.where(visible, scene.sight.range_m, np.nan)[shown][:, columns]
-        marks.append(_marks(entry.detector, found, since_s, scene, visible, rule))
+        marks.append(_marks(entry.detector, found, since_s, scene, rule))
     return Case(
         **about,
         capture_id=capture_id,
         score=score,
         header=header,
         time_s=since_s[shown],
-        range_m=range_m,
-        obstacles=tuple(things[column].name for column in columns),
+        ranges=true_ranges(header, rule.region, shown),
         path_m=header.trajectory.position_m[shown, :2],
-        outlines_m=[(thing.name, thing.structure, _outline(thing.outline_m, shown)) for thing in things],
+        outlines=outlines(header, shown),
         marks=marks,
     )
 
 
-def _outline(outline_m: FloatArray, shown: IntArray) -> FloatArray:
-    """Corners (vertices, 2); of a moving object the way of its middle (shown, 2)."""
-    flat = outline_m[..., :2]
-    return flat[shown].mean(axis=1) if flat.ndim == 3 else flat
-
-
-def _marks(
-    detector: str, found: Detections, since_s: FloatArray, scene: Scene, visible: BoolArray, rule: ScoringRules
-) -> Marks:
+def _marks(detector: str, found: Detections, since_s: FloatArray, scene: Scene, rule: ScoringRules) -> Marks:
     rows = _thinned(len(found))
     error_m = np.abs(scene.errors_m(found, "filtering"))
-    near = np.any((error_m <= rule.gate_m) & visible[found.frame], axis=1)
+    near = np.any((error_m <= rule.gate_m) & scene.visible(rule.region)[found.frame], axis=1)
     none = np.full(len(rows), np.nan)
     return Marks(
         detector=detector,

@@ -5,11 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+from uwbbench.api.text import one_line
 from uwbbench.config.detector import DetectorConfig
 from uwbbench.config.source import CaptureRef
 from uwbbench.run.experiment import Experiment
 from uwbbench.run.folder.identity import capture_name, listing_name, unit_name
 from uwbbench.run.folder.journal import Entry
+
+LONGEST_REASON = 400
 
 
 @dataclass(frozen=True)
@@ -86,5 +89,4 @@ def plan(experiment: Experiment) -> Plan:
 
 def reason_of(error: BaseException) -> str:
     """One line that says why something failed."""
-    text = " ".join(str(error).split()) or "no message"
-    return f"{type(error).__name__}: {text if len(text) <= 400 else text[:400] + '...'}"
+    return f"{type(error).__name__}: {one_line(error, LONGEST_REASON) or 'no message'}"

@@ -121,9 +121,9 @@ class Scores:
         return f"Scores({rules.scoring}, gate {rules.gate_m:g} m: {counts}, F1 {block.f1:.3f}, MAE {block.mae_m:.3f} m)"
 
     def _repr_html_(self) -> str:
-        from uwbbench.show import notebook
+        from uwbbench.show.notebook.scores import scores
 
-        return notebook.scores(self)
+        return scores(self)
 
     def __getitem__(self, table: str) -> ScoreBlock | None:
         if table not in get_args(Table):

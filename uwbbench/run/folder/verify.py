@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from uwbbench.api.errors import UwbbenchError
+from uwbbench.api.text import one_line, printable
 from uwbbench.config.detector import detector_identity
 from uwbbench.measure.accuracy.metrics.choice import MetricChoice
 from uwbbench.run.folder.folder import RunFolder
@@ -116,7 +117,7 @@ class _Verifier:
             self._problem(where, f"does not hold what a run of this version writes: {type(error).__name__}: {error}")
 
     def _problem(self, where: str, what: str) -> None:
-        line = " ".join(what.split())
+        line = one_line(what)
         self.problems.append(f"{where}: {line}" if not line.startswith(f"{where}:") else line)
 
     def _count(self, what: str) -> None:
@@ -340,5 +341,4 @@ def _about(entry: Entry) -> str:
 
 def _shown(value: Any) -> str:
     """Value on one line, cut where it is long."""
-    text = "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in str(value))
-    return text if len(text) <= LONGEST_NAME else f"{text[: LONGEST_NAME - 3]}..."
+    return printable(value, LONGEST_NAME)

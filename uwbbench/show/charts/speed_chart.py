@@ -9,8 +9,8 @@ import numpy as np
 
 from uwbbench.results.pareto import Point
 from uwbbench.show.charts.chart import HEIGHT, Series, Spec, axis, chart, deadline, limits
+from uwbbench.show.text.numbers import between, number, probability
 from uwbbench.show.text.quantity import Quantity
-from uwbbench.show.text.sheet import number
 
 PLOT_PX = (520.0, HEIGHT - 110.0)
 """About the size of the plot in print, for which labels are placed."""
@@ -101,7 +101,7 @@ def _row(point: Point, names: Mapping[str, str], quantity: Quantity) -> Spec:
     value, low, high = (quantity.scaled(v) for v in (point.error.value, point.error.low, point.error.high))
     speed = point.speed
     timed = not math.isnan(speed.low)
-    ends = f"[{number(speed.low, 3)}, {number(speed.high, 3)}]" if timed else "(no interval)"
+    ends = between(speed.low, speed.high, 3) or "(no interval)"
     plural = "capture" if speed.captures == 1 else "captures"
     return {
         "detector": names[point.detector],
@@ -112,19 +112,12 @@ def _row(point: Point, names: Mapping[str, str], quantity: Quantity) -> Spec:
         "low": value if math.isnan(low) else low,
         "high": value if math.isnan(high) else high,
         "front": point.on_front,
-        "label": f"{names[point.detector]}, P {_share(point.probability)}",
+        "label": f"{names[point.detector]}, P {probability(point.probability)}",
         "error": quantity.told(point.error),
         "time": f"{number(speed.ratio, 3)} {ends}, {speed.captures} timed {plural}",
         "p50": f"{number(speed.p50_us, 0)} us on this machine",
-        "chance": _share(point.probability),
+        "chance": probability(point.probability),
     }
-
-
-def _share(value: float) -> str:
-    """Probability from draws as a text, never rounded to certainty."""
-    if math.isnan(value):
-        return "n/a"
-    return ">0.99" if value > 0.99 else "<0.01" if value < 0.01 else f"{value:.2f}"
 
 
 def _place_labels(rows: list[Spec], reach: Sequence[float], span: Sequence[float]) -> None:

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import math
-
 from uwbbench.api import registry
 from uwbbench.api.metric import Outcome
 from uwbbench.measure.accuracy.metrics.choice import MetricChoice
 from uwbbench.measure.accuracy.scoring import ScoreBlock, Scores
 from uwbbench.measure.accuracy.stats import MINIMUM_GROUPS, Estimate, bootstrap
 from uwbbench.show.notebook import elements
+from uwbbench.show.text.numbers import UNDEFINED, between, number
 from uwbbench.show.text.quantity import Quantity
 from uwbbench.show.text.wording import TABLES
 
@@ -39,13 +38,10 @@ def _table(outcome: Outcome) -> str:
 
 
 def _row(quantity: Quantity, estimate: Estimate) -> tuple[str, str, str, str]:
-    def number(value: float) -> str:
-        return f"{quantity.scaled(value):.{quantity.digits}f}"
-
-    if math.isnan(estimate.value):
-        return quantity.axis, "n/a", "", f"{estimate.n} {quantity.samples}"
-    held = "n/a" if math.isnan(estimate.low) else f"[{number(estimate.low)}, {number(estimate.high)}]"
-    return quantity.axis, number(estimate.value), held, f"{estimate.n} {quantity.samples}"
+    shown = quantity.digits, quantity.factor
+    value, ends = number(estimate.value, *shown), between(estimate.low, estimate.high, *shown)
+    held = "" if value == UNDEFINED else ends or UNDEFINED
+    return quantity.axis, value, held, f"{estimate.n} {quantity.samples}"
 
 
 def _counts(block: ScoreBlock) -> str:

@@ -23,8 +23,9 @@ from uwbbench.results.results import Scored
 from uwbbench.results.slices import ALL, Board, Slice, cuts, range_edges_m, slices, span_name
 from uwbbench.show.charts import error_charts, scene_charts, speed_chart, time_chart
 from uwbbench.show.charts.chart import Spec
+from uwbbench.show.text.numbers import number, rounded
 from uwbbench.show.text.quantity import Quantity
-from uwbbench.show.text.sheet import labels, number
+from uwbbench.show.text.sheet import labels
 from uwbbench.show.text.wording import TABLES
 
 
@@ -371,20 +372,15 @@ class Content:
                     speed = self.speeds.get(dataset, {}).get(detector)
                     ratio = [speed.ratio, speed.low, speed.high] if speed else [None] * 3
                     calls = sum(one["n"] for one in facts)
-                    row[index] = [*map(_number, ratio), *(_median(facts, key) for key in ("p50_us", "p99_us")), calls]
+                    row[index] = [*map(rounded, ratio), *(_median(facts, key) for key in ("p50_us", "p99_us")), calls]
             rows.append(row)
         return rows
 
 
 def _median(facts: Sequence[Mapping[str, Any]], key: str) -> float | None:
     known = [one[key] for one in facts if one[key] is not None]
-    return _number(float(np.median(known))) if known else None
+    return rounded(float(np.median(known))) if known else None
 
 
 def _packed(estimate: Any) -> list[Any]:
-    return [_number(estimate.value), _number(estimate.low), _number(estimate.high), estimate.n, estimate.groups]
-
-
-def _number(value: float | None) -> float | None:
-    """Five significant digits, which is more than any interval bears."""
-    return None if value is None or not math.isfinite(value) else float(f"{value:.5g}")
+    return [rounded(estimate.value), rounded(estimate.low), rounded(estimate.high), estimate.n, estimate.groups]

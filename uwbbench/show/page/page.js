@@ -1,30 +1,9 @@
-"use strict";
 (() => {
   const read = (id) => JSON.parse(document.getElementById(id).textContent);
   const data = read("data"), config = read("theme-config");
   const at = (id) => document.getElementById(id);
-  const root = document.documentElement;
+  const { root, make, sortBy, sortable } = base;
 
-  // Theme ------------------------------------------------------------------------------------------------------
-  const themes = ["auto", "light", "dark"];
-  const remembered = () => { try { return localStorage.getItem("uwbbench-theme"); } catch { return null; } };
-  function setTheme(name) {
-    if (name === "auto") root.removeAttribute("data-theme"); else root.dataset.theme = name;
-    at("theme").textContent = "Theme: " + name;
-    at("theme").dataset.now = name;
-    try { localStorage.setItem("uwbbench-theme", name); } catch { /* private windows keep nothing */ }
-  }
-  at("theme").hidden = false;
-  at("theme").addEventListener("click", () => setTheme(themes[(themes.indexOf(at("theme").dataset.now) + 1) % 3]));
-  setTheme(themes.includes(remembered()) ? remembered() : "auto");
-
-  // Small helpers ----------------------------------------------------------------------------------------------
-  function make(tag, text, attributes = {}) {
-    const element = document.createElement(tag);
-    if (text !== undefined) element.textContent = text;
-    for (const [name, value] of Object.entries(attributes)) element.setAttribute(name, value);
-    return element;
-  }
   function fill(select, options, keep) {
     select.replaceChildren(...options.map(([value, text]) => make("option", text, { value })));
     if (options.some(([value]) => value === keep)) select.value = keep;
@@ -32,44 +11,6 @@
   }
   const distinct = (values) => [...new Set(values)];
   const shown = (value, digits, factor) => value === null ? "n/a" : (value * factor).toFixed(digits);
-
-  // Sorting, of any table whose head holds buttons --------------------------------------------------------------
-  const keyOf = (cell) => {
-    const text = cell.dataset.key ?? cell.textContent.trim();
-    const match = /^[-+]?\d[\d.]*(e[-+]?\d+)?/i.exec(text);
-    return match ? Number(match[0]) : /^(n\/a|not |none$|$)/.test(text) ? null : text;
-  };
-  function sortBy(table, column, descending) {
-    const body = table.tBodies[0];
-    const rows = [...body.rows].map((row) => [keyOf(row.cells[column]), row]);
-    const sign = descending ? -1 : 1;
-    rows.sort(([a], [b]) => {
-      if (a === null || b === null) return (a === null) - (b === null);
-      if (typeof a === "number" && typeof b === "number") return sign * (a - b);
-      return sign * String(a).localeCompare(String(b), "en", { numeric: true });
-    });
-    body.append(...rows.map(([, row]) => row));
-    [...table.tHead.rows[0].cells].forEach((head, index) => {
-      if (index === column) head.setAttribute("aria-sort", descending ? "descending" : "ascending");
-      else head.removeAttribute("aria-sort");
-    });
-  }
-  function sortable(table) {
-    [...table.tHead.rows[0].cells].forEach((head, column) => {
-      const button = make("button", head.textContent, { type: "button", title: "Sort by " + head.textContent });
-      button.addEventListener("click", () => {
-        const up = head.getAttribute("aria-sort") === "ascending";
-        const first = head.dataset.first === "descending" && !head.hasAttribute("aria-sort");
-        sortBy(table, column, first || up);
-      });
-      head.replaceChildren(button);
-    });
-  }
-  for (const table of document.querySelectorAll("table.sortable")) {
-    for (const row of table.tBodies[0].rows) for (const cell of row.cells) if (keyOf(cell) !== null && typeof keyOf(cell) === "string") cell.classList.add("text");
-    [...table.tHead.rows[0].cells].forEach((head, column) => head.classList.toggle("text", table.tBodies[0].rows[0].cells[column].classList.contains("text")));
-    sortable(table);
-  }
 
   // Charts -----------------------------------------------------------------------------------------------------
   const options = { mode: "vega-lite", renderer: "svg", actions: false, ast: true, defaultStyle: false, config, tooltip: { disableDefaultStyle: true } };

@@ -14,7 +14,7 @@ from uwbbench.run.folder.identity import digest
 from uwbbench.show.charts import error_charts, speed_chart
 from uwbbench.show.charts.chart import Spec
 from uwbbench.show.charts.theme import PAGE
-from uwbbench.show.page.render import NEEDS, ReportToolsError
+from uwbbench.show.extras import report_tools
 from uwbbench.show.text.quantity import Quantity
 from uwbbench.show.text.sheet import shown
 
@@ -51,10 +51,8 @@ def svg(spec: Spec) -> str:
     ReportToolsError
         If vl-convert is not installed.
     """
-    try:
+    with report_tools():
         import vl_convert
-    except ImportError as error:
-        raise ReportToolsError(NEEDS) from error
     whole: dict[str, Any] = {**spec, "width": WIDTH, "config": PAGE}
     drawn: str = vl_convert.vegalite_to_svg(whole)
     plain = re.sub(r' (?:role|aria-[a-z]+)="[^"<>]*"', "", drawn)

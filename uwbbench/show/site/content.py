@@ -16,11 +16,10 @@ from uwbbench.results.leaderboard.suites import Suite
 from uwbbench.results.results import errors_in
 from uwbbench.show.site import charts
 from uwbbench.show.site.names import Names
+from uwbbench.show.text.numbers import between, interval, number, p_value
 from uwbbench.show.text.quantity import Quantity, undefined_titles
-from uwbbench.show.text.sheet import interval, number, shown
+from uwbbench.show.text.sheet import sentence, shown
 from uwbbench.show.text.wording import TABLES
-
-LONGEST_TEXT = 600
 
 VERDICTS = {
     "differs": "differ",
@@ -173,7 +172,7 @@ class Content:
             return Cell("n/a")
         word = {"differs": "worse" if pair.better == pair.second else "better", "equal": "equal"}.get(pair.verdict)
         difference = pair_text(ranking, pair)
-        return Cell(word or pair.verdict, small=difference, title=f"adjusted p {p_text(pair.adjusted)}")
+        return Cell(word or pair.verdict, small=difference, title=f"adjusted p {p_value(pair.adjusted)}")
 
     @staticmethod
     def _board_notes(ranking: Ranking) -> Iterator[str]:
@@ -240,7 +239,7 @@ class Content:
             counts = [Cell(str(pair.captures)), Cell(str(pair.difference.groups))]
             verdict = Cell(VERDICTS[pair.verdict])
             rows.append(
-                (*names, Cell(by.title), pair_cell(ranking, pair), Cell(p_text(pair.adjusted)), verdict, *counts)
+                (*names, Cell(by.title), pair_cell(ranking, pair), Cell(p_value(pair.adjusted)), verdict, *counts)
             )
         columns = ("first", "second", "metric", "difference", "adjusted p", "verdict", "captures", "groups (n)")
         return Table("Compared in pairs", columns, tuple(rows))
@@ -257,7 +256,7 @@ class Content:
             ),
             ("scoring", f"{', '.join(rule.scoring for rule in rules)}; gate {100 * rules[0].gate_m:g} cm"),
             ("runs", ", ".join(shown(run.name) for run in suite.runs)),
-            ("machines", "; ".join(line(machine) for machine in machines)),
+            ("machines", "; ".join(sentence(machine) for machine in machines)),
             ("reference of times", "none" if reference is None else shown(reference[0])),
         ]
 
@@ -332,8 +331,7 @@ def quantity(ranking: Ranking, name: str) -> Quantity:
 def metric_cell(by: Quantity, estimate: Estimate) -> Cell:
     """Value with its interval below."""
     text = number(estimate.value, by.digits, by.factor)
-    whole = interval(estimate.value, estimate.low, estimate.high, by.digits, by.factor)
-    ends = whole.removeprefix(text).strip()
+    ends = between(estimate.low, estimate.high, by.digits, by.factor)
     return Cell(text, small=ends, key=_key(estimate.value), title=by.told(estimate))
 
 
@@ -342,9 +340,7 @@ def speed_cell(one: Standing) -> Cell:
     speed = one.speed
     if speed is None:
         return Cell("not timed", key="n/a")
-    whole = interval(speed.ratio, speed.low, speed.high, 2)
-    text = number(speed.ratio, 2)
-    return Cell(text, small=whole.removeprefix(text).strip(), key=_key(speed.ratio))
+    return Cell(number(speed.ratio, 2), small=between(speed.low, speed.high, 2), key=_key(speed.ratio))
 
 
 def pair_text(ranking: Ranking, pair: Pair) -> str:
@@ -357,25 +353,6 @@ def pair_text(ranking: Ranking, pair: Pair) -> str:
 def pair_cell(ranking: Ranking, pair: Pair) -> Cell:
     """Difference of a pair."""
     return Cell(pair_text(ranking, pair), key=_key(pair.difference.value))
-
-
-def p_text(value: float) -> str:
-    """A p-value; never rounded to 0.
-
-    Examples
-    --------
-    >>> p_text(0.0002), p_text(0.0312)
-    ('<0.001', '0.031')
-    """
-    if math.isnan(value):
-        return "n/a"
-    return "<0.001" if value < 0.001 else f"{value:.3f}"
-
-
-def line(text: str) -> str:
-    """Text on one line, without control characters, cut where it is very long."""
-    whole = "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in " ".join(text.split()))
-    return whole if len(whole) <= LONGEST_TEXT else f"{whole[:LONGEST_TEXT]}..."
 
 
 def _key(value: float) -> str:

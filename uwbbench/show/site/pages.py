@@ -10,19 +10,19 @@ from typing import Any
 from uwbbench.measure.accuracy.stats import MINIMUM_GROUPS
 from uwbbench.results.leaderboard.ranking import SETTINGS, SIGNIFICANCE, speeds_by_machine
 from uwbbench.results.leaderboard.suites import Contender, Suite
+from uwbbench.show.html.render import badge
 from uwbbench.show.site.content import (
     VERDICTS,
     Cell,
     Content,
     Section,
     Table,
-    line,
     metric_cell,
-    p_text,
     pair_cell,
     quantity,
 )
-from uwbbench.show.text.sheet import interval, number, shown
+from uwbbench.show.text.numbers import interval, number, p_value
+from uwbbench.show.text.sheet import sentence, shown
 from uwbbench.show.text.wording import TABLES
 
 
@@ -109,11 +109,6 @@ def pages(content: Content) -> Iterator[Page]:
     yield _runs(content)
 
 
-def _badge(sources: set[str]) -> str:
-    kinds = {frozenset({"simulated"}): "SIMULATED", frozenset({"measured"}): "MEASURED", frozenset(): "NO RESULT"}
-    return kinds.get(frozenset(sources), "MEASURED AND SIMULATED")
-
-
 def _index(content: Content) -> Page:
     parts = []
     for suite in content.suites:
@@ -141,7 +136,7 @@ def _index(content: Content) -> Page:
     lead = f"{detectors} detectors in {len(content.runs)} verified runs. "
     lead += "Only what was measured on the same captures under the same scoring rules is compared."
     parts.append(Part("How to read it", notes=(*HOW, *_margins(content.sections))))
-    return Page("index.html", "Leaderboard", _badge({one.source for one in content.sections}), lead, tuple(parts))
+    return Page("index.html", "Leaderboard", badge({one.source for one in content.sections}), lead, tuple(parts))
 
 
 def _margins(sections: Sequence[Section]) -> Iterator[str]:
@@ -176,7 +171,7 @@ def _dataset(content: Content, section: Section) -> Page:
     facts = Part("What was compared", facts=tuple(content.suite_facts(suite)), tables=(_captures(section),))
     lead = f"Dataset of {content.names.suite(suite)}."
     parts = (first, *boards, facts, Part("How to read it", notes=(*HOW, *_margins([section]))))
-    return Page(section.address, section.label, _badge({section.source}), lead, parts)
+    return Page(section.address, section.label, badge({section.source}), lead, parts)
 
 
 def _captures(section: Section) -> Table:
@@ -191,9 +186,9 @@ def _captures(section: Section) -> Table:
             else [
                 str(len(header)),
                 "none" if header.radar.channel is None else str(header.radar.channel),
-                line(header.license),
-                line(header.citation),
-                line(header.description),
+                sentence(header.license),
+                sentence(header.citation),
+                sentence(header.description),
             ]
         )
         rows.append(tuple(Cell(text) for text in (shown(capture), *about, sha256[:12] or "not opened by any run")))
@@ -237,7 +232,7 @@ def _detector(content: Content, contender: Contender) -> Page:
     ]
     versions = f" Other versions of the same name: {', '.join(dict.fromkeys(others))}." if others else ""
     lead = f"Identity {contender.identity[:12]}: steps, parameters and sources.{versions}"
-    return Page(content.names.detector_page(contender), label, _badge({s.source for s in sections}), lead, tuple(parts))
+    return Page(content.names.detector_page(contender), label, badge({s.source for s in sections}), lead, tuple(parts))
 
 
 def _results(content: Content, contender: Contender, sections: list[Section]) -> Table:
@@ -284,7 +279,7 @@ def _others(content: Content, contender: Contender, sections: list[Section]) -> 
                 cells = (
                     Cell(quantity(ranking, name).title),
                     pair_cell(ranking, pair),
-                    Cell(p_text(pair.adjusted)),
+                    Cell(p_value(pair.adjusted)),
                     Cell(word),
                 )
                 rows.append((content.detector_cell(one), *cells, Cell(str(pair.captures))))
@@ -298,7 +293,7 @@ def _times(content: Content, mine: list[tuple[Suite, Contender]]) -> Table:
         for dataset in suite.datasets:
             for machine, speed in speeds_by_machine(suite, contender, dataset).items():
                 ratio = interval(speed.ratio, speed.low, speed.high, 3)
-                about = (line(machine), content.names.suite(suite), shown(dataset), shown(speed.reference))
+                about = (sentence(machine), content.names.suite(suite), shown(dataset), shown(speed.reference))
                 times = (
                     Cell(ratio, key=f"{speed.ratio:.6g}"),
                     Cell(number(speed.p50_us, 0)),
@@ -317,16 +312,16 @@ def _failures(mine: list[tuple[Suite, Contender]]) -> Table:
             reasons = [entry.reason] if entry.status == "failed" else []
             reasons += [f"{row['scoring']}: {row['reason']}" for row in entry.scores if row["status"] == "unscored"]
             about = (suite.name, entry.dataset, entry.capture, run.name)
-            rows += [tuple(Cell(line(text)) for text in (*about, reason)) for reason in reasons]
+            rows += [tuple(Cell(sentence(text)) for text in (*about, reason)) for reason in reasons]
     return Table("Failed or not scored", ("suite", "dataset", "capture", "run", "reason"), tuple(rows))
 
 
 def _notes(mine: list[tuple[Suite, Contender]]) -> Iterator[str]:
     for _, contender in mine:
-        yield from (line(text) for text in contender.disagreements)
+        yield from (sentence(text) for text in contender.disagreements)
         hard = contender.stability
         if hard is not None and "refused" in hard:
-            yield f"It refuses the capture of the hard cases: {line(hard['refused'])}"
+            yield f"It refuses the capture of the hard cases: {sentence(hard['refused'])}"
         elif hard is not None:
             yield (
                 f"Hard cases (SIMULATED): {hard['passed']} passed, {hard['failed']} failed, "
@@ -337,7 +332,7 @@ def _notes(mine: list[tuple[Suite, Contender]]) -> Iterator[str]:
 def _facts(mine: list[tuple[Suite, Contender]]) -> Iterator[tuple[str, str]]:
     contender = mine[0][1]
     newest = contender.runs[-1]
-    yield "name", line(contender.name)
+    yield "name", sentence(contender.name)
     yield "identity", contender.identity
     yield "fidelity", str(contender.config["fidelity"])
     yield "runs", ", ".join(dict.fromkeys(shown(run.name) for _, one in mine for run in one.runs))
@@ -359,7 +354,7 @@ def _runs(content: Content) -> Page:
             shown(run.name),
             content.names.suite(suite),
             run.started,
-            "; ".join(line(machine) for machine in run.machines),
+            "; ".join(sentence(machine) for machine in run.machines),
             f"uwbbench {shown(versions['uwbbench'])}, numpy {shown(versions['numpy'])}",
             str(len(run.manifest["detectors"])),
             f"{len(run.entries) - failed} done, {failed} failed",
@@ -368,7 +363,7 @@ def _runs(content: Content) -> Page:
         rows.append(tuple(map(Cell, cells)))
     columns = ("run", "suite", "started", "machine", "versions", "detectors", "units", "verified")
     failures = [
-        tuple(Cell(line(text)) for text in (run.name, entry.kind, entry.detector, entry.dataset, entry.reason))
+        tuple(Cell(sentence(text)) for text in (run.name, entry.kind, entry.detector, entry.dataset, entry.reason))
         for run in content.runs
         for entry in run.entries
         if entry.status == "failed" and entry.kind != "accuracy"
@@ -382,4 +377,4 @@ def _runs(content: Content) -> Page:
         "Every run was verified before anything was taken from it: files against their hashes, names and identities "
         "against the manifest, scores against the stored detections. Detections themselves are taken as they are."
     )
-    return Page("runs.html", "Runs", _badge({one.source for one in content.sections}), lead, parts)
+    return Page("runs.html", "Runs", badge({one.source for one in content.sections}), lead, parts)

@@ -6,7 +6,8 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 from uwbbench.results.limits import BLIND_UP_TO_M, CLEAR_M, GATE_M, Limits
-from uwbbench.show.text.sheet import Sheet, interval, number, shown
+from uwbbench.show.text.numbers import interval, number
+from uwbbench.show.text.sheet import Sheet, shown
 
 if TYPE_CHECKING:
     import pandas as pd

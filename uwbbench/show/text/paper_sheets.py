@@ -6,8 +6,9 @@ from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING
 
 from uwbbench.results import published
+from uwbbench.show.text.numbers import interval, number
 from uwbbench.show.text.quantity import Quantity
-from uwbbench.show.text.sheet import Sheet, interval, number, shown
+from uwbbench.show.text.sheet import Sheet, shown
 from uwbbench.show.text.wording import TABLES
 
 if TYPE_CHECKING:

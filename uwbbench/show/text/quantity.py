@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from uwbbench.api.metric import Metric
 from uwbbench.measure.accuracy.stats import Estimate
-from uwbbench.show.text.sheet import interval, number
+from uwbbench.show.text.numbers import interval, number
 
 
 @dataclass(frozen=True)

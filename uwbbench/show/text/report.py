@@ -6,16 +6,16 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+from uwbbench.api.text import one_line
 from uwbbench.measure.accuracy.metrics.choice import MetricChoice
 from uwbbench.measure.accuracy.stats import MINIMUM_GROUPS
 from uwbbench.results.report import Report
 from uwbbench.show.text.limits_sheets import limits_sheets
+from uwbbench.show.text.numbers import interval, number
 from uwbbench.show.text.paper_sheets import paper_sheets
 from uwbbench.show.text.quantity import Quantity, undefined_titles
-from uwbbench.show.text.sheet import Sheet, escaped, interval, number, shown
+from uwbbench.show.text.sheet import Sheet, escaped, sentence, shown
 from uwbbench.show.text.wording import TABLES
-
-LONGEST_LINE = 600
 
 
 def sheets(report: Report) -> list[Sheet]:
@@ -62,20 +62,20 @@ class Tables:
         """What was compared on, with licence."""
         keys = ("dataset", "capture", "source", "frames", "license", "description")
         if self._report.captures:
-            rows = tuple(tuple(_line(str(one[key])) for key in keys) for one in self._report.captures)
+            rows = tuple(tuple(sentence(str(one[key])) for key in keys) for one in self._report.captures)
             yield Sheet("Captures", keys, rows)
 
     def failed(self) -> Iterator[Sheet]:
         """What did not run, and what could not be scored, with reasons."""
         if self._report.failures:
             failed = tuple(
-                (str(e.kind), shown(e.detector), shown(e.dataset), shown(e.capture), _line(e.reason))
+                (str(e.kind), shown(e.detector), shown(e.dataset), shown(e.capture), sentence(e.reason))
                 for e in self._report.failures
             )
             yield Sheet("Failed", ("what", "detector", "dataset", "capture", "reason"), failed)
         if self._report.unscored:
             rows = tuple(
-                (shown(e.detector), shown(e.capture), scoring, _line(reason))
+                (shown(e.detector), shown(e.capture), scoring, sentence(reason))
                 for e, scoring, reason in self._report.unscored
             )
             yield Sheet("Not scored", ("detector", "capture", "scoring", "reason"), rows)
@@ -86,10 +86,10 @@ def markdown(report: Report) -> str:
     name, about = report.experiment["name"], report.experiment["description"]
     lines = ["<!-- uwbbench report -->", f"# {escaped(shown(name))}", ""]
     if about:
-        lines += [escaped(" ".join(about.split())), ""]
+        lines += [escaped(one_line(about)), ""]
     lines += [sheet.markdown() for sheet in sheets(report)]
     if report.notes:
-        lines += ["## Notes", "", *(f"* {escaped(_line(note))}" for note in report.notes), ""]
+        lines += ["## Notes", "", *(f"* {escaped(sentence(note))}" for note in report.notes), ""]
     session = report.folder.manifest["sessions"][-1]
     machine, versions = session["machine"], session["versions"]
     made = f"uwbbench {versions['uwbbench']}, Python {versions['python']}, {machine['cpu']}, {machine['os']}"
@@ -100,12 +100,6 @@ def markdown(report: Report) -> str:
 def write_report(report: Report) -> Path:
     """Write ``report.md`` into its run folder."""
     return report.folder.write_text("report.md", markdown(report))
-
-
-def _line(text: str) -> str:
-    """Text on one line, without control characters, cut where it is very long."""
-    line = "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in " ".join(text.split()))
-    return line if len(line) <= LONGEST_LINE else f"{line[:LONGEST_LINE]}..."
 
 
 def _leaderboards(report: Report) -> Iterator[Sheet]:
@@ -170,13 +164,13 @@ def _stability(report: Report) -> Sheet:
         name = shown(one["detector"])
         if "refused" in one:
             rows.append((name, *["n/a"] * (len(columns) - 1)))
-            notes.append(f"{name} cannot run on the capture of the hard cases: {_line(one['refused'])}")
+            notes.append(f"{name} cannot run on the capture of the hard cases: {sentence(one['refused'])}")
             continue
         counts = [str(one[key]) for key in ("passed", "failed", "not_applicable")]
         sizes = ["n/a" if one[key] is None else f"{one[key]:.1e}" for key in ("largest_error_m", "largest_error_ulp")]
         flips = [number(one[key], 2, 100.0) for key in ("flips_float32", "flips_one_ulp")]
         rows.append((name, number(one["usual_hits"], 0, 100.0), *counts, *sizes, *flips))
-        failed = [f"{case['case']} ({_line(case['detail'])})" for case in one["cases"] if case["status"] == "failed"]
+        failed = [f"{case['case']} ({sentence(case['detail'])})" for case in one["cases"] if case["status"] == "failed"]
         notes += [f"{name} failed: {shown('; '.join(failed))}"] if failed else []
     about = (
         "Inputs at which numerical code breaks, made by uwbbench and SIMULATED; 'uwbbench stability' tells each case."

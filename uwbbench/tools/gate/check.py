@@ -8,6 +8,7 @@ from enum import StrEnum
 from typing import Any, Literal
 
 from uwbbench.run.folder.identity import plain
+from uwbbench.show.text.numbers import number
 
 Aspect = Literal["captures", "accuracy", "deadline", "canary", "latency"]
 """What a check is about."""
@@ -80,9 +81,9 @@ class Check:
         """Value, interval and number of samples, for people."""
         if self.value is None:
             return "n/a"
-        text = number(self.value, self.unit)
+        text = _quantity(self.value, self.unit)
         if self.low is not None and self.high is not None:
-            text += f" [{number(self.low, self.unit)}, {number(self.high, self.unit)}]"
+            text += f" [{_quantity(self.low, self.unit)}, {_quantity(self.high, self.unit)}]"
         return f"{self.quantity} {text}, {self.n} {self.counted}".strip()
 
     @property
@@ -91,7 +92,7 @@ class Check:
         if self.limit is None:
             return ""
         sign = "<=" if self.bound == "maximum" else ">="
-        return f"{sign} {number(self.limit, self.unit)}"
+        return f"{sign} {_quantity(self.limit, self.unit)}"
 
 
 @dataclass(frozen=True)
@@ -128,16 +129,13 @@ class GateResult:
         return dict(plain({**about, "head": self.head, "base": self.base, "checks": checks, "machine": self.machine}))
 
 
-def number(value: float, unit: str) -> str:
+def _quantity(value: float, unit: str) -> str:
     """Number as people read it: centimetres, per cent, or three digits.
 
     Examples
     --------
-    >>> number(0.0312, "m"), number(0.004, "share"), number(1.0123, "")
+    >>> _quantity(0.0312, "m"), _quantity(0.004, "share"), _quantity(1.0123, "")
     ('3.12 cm', '0.40 %', '1.012')
     """
-    if unit == "m":
-        return f"{value * 100:.2f} cm"
-    if unit == "share":
-        return f"{value * 100:.2f} %"
-    return f"{value:.3f} {unit}".rstrip()
+    digits, scale, shown = {"m": (2, 100.0, "cm"), "share": (2, 100.0, "%")}.get(unit, (3, 1.0, unit))
+    return number(value, digits, scale, shown)

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from datetime import UTC, datetime
 from xml.etree import ElementTree as ET
 
+from uwbbench.api.text import one_line
 from uwbbench.show.text.sheet import Sheet
 from uwbbench.tools.gate.check import Check, GateResult, GateVerdict
 
@@ -84,15 +85,3 @@ def _testcase(suite: ET.Element, gate: str, check: Check) -> None:
     said = [part for part in (check.measured_text, check.limit_text, check.advice) if part]
     told = ET.SubElement(case, outcome, message=one_line(check.reason or check.verdict.value), type=check.verdict.value)
     told.text = one_line("; ".join(said))
-
-
-def one_line(text: str) -> str:
-    r"""Text on one line, whatever is not printable, and not allowed in XML, shown by its escape.
-
-    Examples
-    --------
-    >>> one_line("two\nlines\x1b[0m")
-    'two lines\\x1b[0m'
-    """
-    joined = " ".join(text.split())
-    return "".join(char if char.isprintable() else char.encode("unicode_escape").decode() for char in joined)

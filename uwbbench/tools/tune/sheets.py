@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
+from uwbbench.api.text import one_line
 from uwbbench.measure.accuracy.metrics.detection import F1
+from uwbbench.show.text.numbers import number
 from uwbbench.show.text.quantity import Quantity
-from uwbbench.show.text.sheet import Sheet, escaped, number, shown
+from uwbbench.show.text.sheet import Sheet, escaped, shown
 from uwbbench.tools.tune.evaluate import Result
 from uwbbench.tools.tune.execute import TuneOutcome
 
@@ -86,7 +88,7 @@ def markdown(outcome: TuneOutcome) -> str:
     """All tables as Markdown."""
     lines = [f"# {escaped(shown(outcome.tuning.name))}", ""]
     if outcome.tuning.model.description:
-        lines += [escaped(" ".join(outcome.tuning.model.description.split())), ""]
+        lines += [escaped(one_line(outcome.tuning.model.description)), ""]
     return "\n".join([*lines, *(sheet.markdown() for sheet in sheets(outcome))])
 
 
