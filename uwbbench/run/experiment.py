@@ -19,6 +19,7 @@ from uwbbench.api.locate import find_config
 from uwbbench.api.override import merged, with_values
 from uwbbench.api.yaml_file import Path_, YamlFile, read_yaml
 from uwbbench.config.detector import DetectorConfig, read_detector
+from uwbbench.config.given import Given, read_given
 from uwbbench.config.source import CaptureRef, data_roots, open_dataset
 from uwbbench.measure.latency.settings import LatencyModel
 
@@ -214,15 +215,13 @@ class Experiment:
         }
 
 
-def read_experiment(
-    name: str | Path, changes: Mapping[str, Any] | None = None, data_dir: Path | None = None
-) -> Experiment:
+def read_experiment(name: Given, changes: Mapping[str, Any] | None = None, data_dir: Path | None = None) -> Experiment:
     """Read an experiment by name or path, with every detector and dataset in it checked.
 
     Parameters
     ----------
-    name : str or Path
-        Shipped name, or a path to a YAML file.
+    name : str, Path or mapping
+        Shipped name, a path to a YAML file, or the values of one.
     changes : mapping, optional
         Values to change, by path, before checking: ``{"gate_m": 0.1}``.
     data_dir : Path, optional
@@ -237,8 +236,7 @@ def read_experiment(
     ConfigError, PluginError
         If a file is missing or wrong; the message names file, line and key.
     """
-    path = find_config("experiments", str(name))
-    source = read_yaml(path)
+    path, source = read_given("experiments", name)
     data = _extended(source, path, (path.resolve(),))
     if changes:
         data = with_values(data, changes, "--set")

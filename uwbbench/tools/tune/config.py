@@ -17,8 +17,9 @@ from uwbbench.api.errors import ConfigError
 from uwbbench.api.filters import RankFilter
 from uwbbench.api.locate import find_config
 from uwbbench.api.override import with_values
-from uwbbench.api.yaml_file import YamlFile, read_yaml
+from uwbbench.api.yaml_file import YamlFile
 from uwbbench.config.detector import DetectorConfig, read_detector
+from uwbbench.config.given import Given, read_given
 from uwbbench.config.source import data_roots
 from uwbbench.detect.pipeline import Pipeline
 from uwbbench.measure.accuracy.scoring import Region, ScoringRules
@@ -220,7 +221,7 @@ class Tuning:
 
 
 def read_tuning(
-    name: str | Path,
+    name: Given,
     changes: Mapping[str, Any] | None = None,
     data_dir: Path | None = None,
     experiment: str | None = None,
@@ -229,8 +230,8 @@ def read_tuning(
 
     Parameters
     ----------
-    name : str or Path
-        Shipped name, or a path to a YAML file.
+    name : str, Path or mapping
+        Shipped name, a path to a YAML file, or the values of one.
     changes : mapping, optional
         Values to change, by path, before checking: ``{"search.trials": 20}``.
     data_dir : Path, optional
@@ -247,8 +248,7 @@ def read_tuning(
     ConfigError, PluginError
         If a file is missing or wrong; the message names file, line and key.
     """
-    path = find_config("tuning", str(name))
-    source = read_yaml(path)
+    path, source = read_given("tuning", name)
     data = with_values(source.data, changes, "--set") if changes else source.data
     model = checked(TuneModel, data, source)
     is_file = model.detector.endswith((".yaml", ".yml")) or "/" in model.detector
