@@ -289,7 +289,10 @@ def plot(
     detector: str | Pipeline | None = None,
     capture: str | None = None,
     dataset: str | None = None,
-    **choices: Any,
+    frame: int | None = None,
+    scoring: str | None = None,
+    gate_m: float | None = None,
+    table: str | None = None,
 ) -> Path:
     """Draw a picture for print, as the command ``plot`` does; simulated captures are labelled so.
 
@@ -305,8 +308,12 @@ def plot(
         Detector to run on a capture; name of one of the run's.
     capture, dataset : str, optional
         Which of the run's.
-    **choices
-        ``frame`` for ``cir``; ``scoring``, ``gate_m`` and ``table`` for ``cdf``; ``gate_m`` for ``properties``.
+    frame : int, optional
+        Of the capture, for ``cir``.
+    scoring, table : str, optional
+        How detections are counted, and which errors (``filtering`` or ``mapping``), for ``cdf``.
+    gate_m : float, optional
+        Largest error of a true detection, for ``cdf`` and ``properties``.
 
     Returns
     -------
@@ -323,7 +330,7 @@ def plot(
     from uwbbench.show.figures import style
     from uwbbench.show.figures.draw import Choices, draw_capture, draw_run
 
-    target, chosen = _picture(path), Choices(**choices)
+    target, chosen = _picture(path), Choices(frame, scoring, gate_m, table)
     if isinstance(source, Run):
         name = detector.name if isinstance(detector, Pipeline) else detector
         drawn = draw_run(kind, source.folder, chosen, name, capture, dataset)
