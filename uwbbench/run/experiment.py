@@ -12,12 +12,13 @@ from pydantic import Field, field_validator
 from uwbbench.api import registry
 from uwbbench.api.check import checked
 from uwbbench.api.errors import ConfigError
-from uwbbench.api.locate import find_config, is_path
+from uwbbench.api.locate import is_path
 from uwbbench.api.override import with_values
-from uwbbench.api.yaml_file import YamlFile, read_yaml
+from uwbbench.api.yaml_file import YamlFile
 from uwbbench.config.datasets import DatasetSource, DatasetUse, dataset_sources
 from uwbbench.config.detector import DetectorConfig, read_detector
 from uwbbench.config.extends import extended, placed
+from uwbbench.config.given import Given, read_given
 from uwbbench.config.model import ConfigModel, DetectorName
 from uwbbench.config.rules import GateRadius, IntervalModel, RegionModel, Scoring, Strongest
 from uwbbench.config.source import data_roots
@@ -127,15 +128,13 @@ class Experiment:
         }
 
 
-def read_experiment(
-    name: str | Path, changes: Mapping[str, Any] | None = None, data_dir: Path | None = None
-) -> Experiment:
+def read_experiment(name: Given, changes: Mapping[str, Any] | None = None, data_dir: Path | None = None) -> Experiment:
     """Read an experiment by name or path, with every detector and dataset in it checked.
 
     Parameters
     ----------
-    name : str or Path
-        Shipped name, or a path to a YAML file.
+    name : str, Path or mapping
+        Shipped name, a path to a YAML file, or the values of one.
     changes : mapping, optional
         Values to change, by path, before checking: ``{"gate_m": 0.1}``.
     data_dir : Path, optional
@@ -150,8 +149,7 @@ def read_experiment(
     ConfigError, PluginError
         If a file is missing or wrong; the message names file, line and key.
     """
-    path = find_config("experiments", str(name))
-    source = read_yaml(path)
+    path, source = read_given("experiments", name)
     data = extended(source, "experiments", path, _with_absolute_paths)
     if changes:
         data = with_values(data, changes, "--set")

@@ -14,10 +14,11 @@ from uwbbench.api.check import checked
 from uwbbench.api.errors import ConfigError, nearest
 from uwbbench.api.locate import find_config, is_path
 from uwbbench.api.override import with_values
-from uwbbench.api.yaml_file import YamlFile, read_yaml
+from uwbbench.api.yaml_file import YamlFile
 from uwbbench.config.datasets import DatasetSource, DatasetUse, dataset_sources
 from uwbbench.config.detector import read_detector
 from uwbbench.config.extends import placed
+from uwbbench.config.given import Given, read_given
 from uwbbench.config.model import ConfigModel, DetectorName, NamedNull
 from uwbbench.config.rules import GateRadius, IntervalModel, RegionModel, Scoring, Strongest, Table
 from uwbbench.config.source import data_roots
@@ -163,15 +164,15 @@ class Gate:
     folder: Path
 
 
-def read_gate(name: str | Path, changes: Mapping[str, Any] | None = None, data_dir: Path | None = None) -> Gate:
+def read_gate(name: Given, changes: Mapping[str, Any] | None = None, data_dir: Path | None = None) -> Gate:
     """Read a gate file.
 
     Detectors of this environment are checked; those of others can only be checked there, when the gate runs.
 
     Parameters
     ----------
-    name : str or Path
-        Shipped name, or a path to a YAML file.
+    name : str, Path or mapping
+        Shipped name, a path to a YAML file, or the values of one.
     changes : mapping, optional
         Values to change, by path, before checking: ``{"latency.maximum_ratio": 1.1}``.
     data_dir : Path, optional
@@ -186,8 +187,7 @@ def read_gate(name: str | Path, changes: Mapping[str, Any] | None = None, data_d
     ConfigError, PluginError
         If a file is missing or wrong; the message names file, line and key.
     """
-    path = find_config("gates", str(name))
-    source = read_yaml(path)
+    path, source = read_given("gates", name)
     data = with_values(source.data, changes, "--set") if changes else source.data
     model = checked(GateModel, data, source)
     base = None if model.base is None else _side("base", model.base, source, path.parent)

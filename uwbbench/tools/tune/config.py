@@ -17,10 +17,11 @@ from uwbbench.api.errors import ConfigError
 from uwbbench.api.filters import RankFilter
 from uwbbench.api.locate import find_config, is_path
 from uwbbench.api.override import with_values
-from uwbbench.api.yaml_file import YamlFile, read_yaml
+from uwbbench.api.yaml_file import YamlFile
 from uwbbench.config.datasets import DatasetSource, DatasetUse, dataset_sources
 from uwbbench.config.detector import DetectorConfig, read_detector
 from uwbbench.config.extends import placed
+from uwbbench.config.given import Given, read_given
 from uwbbench.config.model import ConfigModel
 from uwbbench.config.rules import GateRadius, IntervalModel, RegionModel, Scoring, Table
 from uwbbench.config.source import data_roots
@@ -205,7 +206,7 @@ class Tuning:
 
 
 def read_tuning(
-    name: str | Path,
+    name: Given,
     changes: Mapping[str, Any] | None = None,
     data_dir: Path | None = None,
     experiment: str | None = None,
@@ -214,8 +215,8 @@ def read_tuning(
 
     Parameters
     ----------
-    name : str or Path
-        Shipped name, or a path to a YAML file.
+    name : str, Path or mapping
+        Shipped name, a path to a YAML file, or the values of one.
     changes : mapping, optional
         Values to change, by path, before checking: ``{"search.trials": 20}``.
     data_dir : Path, optional
@@ -232,8 +233,7 @@ def read_tuning(
     ConfigError, PluginError
         If a file is missing or wrong; the message names file, line and key.
     """
-    path = find_config("tuning", str(name))
-    source = read_yaml(path)
+    path, source = read_given("tuning", name)
     data = with_values(source.data, changes, "--set") if changes else source.data
     model = checked(TuneModel, data, source)
     with placed(source, ("detector",)):
