@@ -289,6 +289,82 @@ def test_a_change_in_a_module_that_is_called_or_read_is_noticed(
     assert getattr(imported(tmp_path / "caller.py"), function)(0.0) == expected
 
 
+def test_a_source_edited_before_the_first_call_is_not_taken_for_what_was_compiled(source: Path) -> None:
+    module = imported(source)
+    source.write_text(SOURCE.replace("value * SCALE", "value * SCALE * SCALE"))
+    assert module.total(VALUES) == 20.0
+    assert imported(source).total(VALUES) == 40.0
+
+
+def answers(folder: Path, **texts: str) -> list[str]:
+    """What ``kernels.answer()`` says in a new process, and whether it was compiled there, given texts of modules."""
+    for name, text in texts.items():
+        (folder / f"{name}.py").write_text(text)
+    script = (
+        "import kernels\nfrom uwbbench.api.compiling import compile_counts\n"
+        "print(kernels.answer(), compile_counts().fresh > 0)"
+    )
+    places = {**os.environ, "PYTHONPATH": str(folder), "UWBBENCH_CACHE_DIR": str(folder / "kept")}
+    command = [sys.executable, "-B", "-c", script]  # a .pyc is stale only after a second
+    return subprocess.run(command, env=places, capture_output=True, text=True, check=True).stdout.split()
+
+
+RECORDS = """\
+from typing import NamedTuple
+
+class Own(NamedTuple):
+    near: float
+    far: float
+
+class Pair(NamedTuple):
+    own: Own
+    factor: int
+"""
+USES = {
+    "argument": "def first(own): return own.near\n\ndef answer(): return first(Own(near=1.0, far=2.0))",
+    "part of a named tuple": (
+        "def first(pair): return pair.own.near\n\ndef answer(): return first(Pair(Own(near=1.0, far=2.0), 3))"
+    ),
+    "part of a list": (
+        "def first(owns): return owns[0].near\n\ndef answer(): return first(List([Own(near=1.0, far=2.0)]))"
+    ),
+    "result": "def first(far): return Own(near=1.0, far=far)\n\ndef answer(): return first(2.0).near",
+}
+
+
+@pytest.mark.parametrize("use", USES)
+def test_a_named_tuple_of_another_module_whose_fields_change_places_is_noticed(tmp_path: Path, use: str) -> None:
+    """Fields are places in memory to machine code: what it was compiled for would give the wrong one."""
+    head = (
+        "from numba.typed import List\nfrom records import Own, Pair\nfrom uwbbench.api import compiled\n\n@compiled\n"
+    )
+    assert answers(tmp_path, kernels=head + USES[use], records=RECORDS) == ["1.0", "True"]
+    swapped = RECORDS.replace("    near: float\n    far: float", "    far: float\n    near: float")
+    assert answers(tmp_path, records=swapped) == ["1.0", "True"]
+    assert answers(tmp_path) == ["1.0", "False"]
+
+
+HUB = "from steps import add as first, scale as second"
+STEPS = """\
+from uwbbench.api import compiled
+
+@compiled
+def add(x): return x + 1.0
+
+@compiled
+def scale(x): return x * 10.0
+"""
+
+
+def test_two_names_that_change_their_meaning_in_another_module_are_noticed(tmp_path: Path) -> None:
+    """Neither the function nor those that it calls are edited: only which is called by which name."""
+    head = "from hub import first, second\nfrom uwbbench.api import compiled\n\n@compiled\n"
+    kernels = f"{head}def chain(x): return second(first(x))\n\ndef answer(): return chain(1.0)"
+    assert answers(tmp_path, kernels=kernels, hub=HUB, steps=STEPS) == ["20.0", "True"]
+    assert answers(tmp_path, hub="from steps import add as second, scale as first") == ["11.0", "True"]
+    assert answers(tmp_path) == ["11.0", "False"]
+
+
 def test_another_processor_does_not_load_this_ones_machine_code(source: Path) -> None:
     imported(source).total(VALUES)
     script = (
