@@ -6,9 +6,8 @@ import math
 from typing import Any
 
 import numpy as np
-from numba.np.unsafe.ndarray import to_fixed_tuple
 
-from uwbbench.api import FloatArray, IntArray, compiled, inlined
+from uwbbench.api import FloatArray, IntArray, as_tuple, compiled, inlined
 from uwbbench_detectors.compiled import layout as at
 from uwbbench_detectors.compiled import short
 from uwbbench_detectors.compiled.examine import MORE, UNCLEAR, Signal, examine_all, examine_by_strength, examine_sets
@@ -17,9 +16,6 @@ from uwbbench_detectors.compiled.lanes import BLOCK, LANES, largest_of, least_of
 from uwbbench_detectors.compiled.layout import HOW, LIMITS, NEAR
 from uwbbench_detectors.compiled.place import azimuth_of, position_of, range_of
 from uwbbench_detectors.peaks.noise import FRAMES_TO_JUDGE, SUSPICIOUS_RATIO
-
-as_tuple: Any = to_fixed_tuple
-"""Settings as values of their own: those of an array are read anew after whatever is written to any array."""
 
 
 @inlined
@@ -160,6 +156,7 @@ def search(
     int
         Detections found; -1 less that if frames are irregular.
     """
+    # As values of their own: those of an array are read anew after whatever is written to any array.
     how, limits = as_tuple(settings, HOW), as_tuple(bounds, LIMITS)
     start, stop = how[at.PROFILE_START], samples.shape[1]
     single = how[at.SELECT] == at.SELECT_STRONGEST and how[at.COUNT] == 1
