@@ -5,7 +5,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-SCRIPT = Path(__file__).parent / "bench" / "run.py"
+SCRIPT = Path(__file__).parent / "run.py"
 
 
 def run(*arguments: str) -> subprocess.CompletedProcess[str]:

@@ -150,7 +150,7 @@ def test_a_stage_that_cannot_be_loaded_keeps_its_name_and_its_reason(monkeypatch
             raise PluginError("stage 'peaks' cannot be loaded: its library is missing")
         return load(kind, name)
 
-    monkeypatch.setattr(registry, "load", broken)
+    monkeypatch.setattr(registry, "load_plugin", broken)
     schema = detector_schema()
     use = schema["$defs"]["StepModel"]["properties"]["use"]
     assert "peaks" in use["enum"]

@@ -83,7 +83,7 @@ def test_such_names_may_be_used(name):
         ("x" * 10_000, "10000 characters"),
         ("lambda", "Python keyword; choose another, such as 'my.lambda'"),
         ("None", "Python keyword"),
-        ("peaks", r"taken by uwbbench .*uwbbench_detectors\.peaks:Peaks.*such as 'my\.peaks'"),
+        ("peaks", r"taken by uwbbench .*uwbbench_detectors\.peaks\.peaks:Peaks.*such as 'my\.peaks'"),
         ("filter-width", r"mistaken for 'filter\.width'"),
         ("Peaks", "mistaken for 'peaks'"),
         ("detectors", "a package uwbbench_detectors is installed"),
