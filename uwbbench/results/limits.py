@@ -213,7 +213,7 @@ class Limits:
     def _false_alarms(self, trial: Trial) -> Iterator[dict[str, Any]]:
         radar = trial.header.radar
         cell_m = SPEED_OF_LIGHT_M_S * radar.sample_interval_s / 2
-        cells = int(np.sum(_clear(np.arange(radar.taps) * cell_m)))
+        cells = int(np.sum(_clear(cell_m * np.arange(radar.taps, dtype=np.float64))))
         frames = len(trial.found.processed)
         row = np.searchsorted(trial.found.processed, trial.found.frame[_clear(trial.found.range_m)])
         alarms = np.bincount(row, minlength=frames)

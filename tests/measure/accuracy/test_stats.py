@@ -9,6 +9,7 @@ import scipy.stats
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tests.fixtures.chance import SIGMAS, plausible
 from uwbbench.api.metric import Outcome
 from uwbbench.measure.accuracy.metrics.detection import FalseAlarmsPerMinute, Precision, Recall
 from uwbbench.measure.accuracy.metrics.error import Bias, MeanAbsoluteError, Percentile90
@@ -22,7 +23,6 @@ from uwbbench.measure.accuracy.stats import (
     paired_difference,
     samples_needed,
 )
-from tests.fixtures.chance import SIGMAS, plausible
 
 
 def outcome(rng, frames=40, blocks=4, hit=0.8, offset_m=0.0, noise_m=0.05):
@@ -108,7 +108,7 @@ def test_interval_agrees_with_scipys_bootstrap_of_group_means():
     theirs = scipy.stats.bootstrap(
         (recalls,), np.mean, n_resamples=4000, method="percentile", random_state=np.random.default_rng(2)
     ).confidence_interval
-    # The standard error of a 2.5 % quantile of 4000 normal draws is sqrt(0.025 * 0.975 / 4000) / phi(1.96) of their own.
+    # Standard error of a 2.5 % quantile of 4000 normal draws.
     quantile_se = np.std(recalls) / np.sqrt(30) * np.sqrt(0.025 * 0.975 / 4000) / scipy.stats.norm.pdf(1.96)
     assert ours.low == pytest.approx(theirs.low, abs=SIGMAS * np.sqrt(2) * quantile_se)
     assert ours.high == pytest.approx(theirs.high, abs=SIGMAS * np.sqrt(2) * quantile_se)

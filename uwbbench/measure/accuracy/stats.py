@@ -300,7 +300,7 @@ def clustered_proportion(successes: IntArray, trials: int, confidence: float = 0
     >>> apart, together = np.zeros(1000, int), np.zeros(1000, int)
     >>> apart[:40], together[:4] = 1, 10
     >>> [tuple(round(end, 4) for end in clustered_proportion(alarms, 20)) for alarms in (apart, together)]
-    [(0.0014, 0.0028), (0.0005, 0.0051)]
+    [(0.0013, 0.0029), (0.0005, 0.0052)]
     """
     total = float(np.sum(successes))
     effect = (float(np.sum(np.square(successes))) + trials) / (total + 1)
