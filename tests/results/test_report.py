@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.fixtures.chance import reseeded
 from uwbbench.api import Capture, StoreError, write_capture
 from uwbbench.measure.accuracy.scoring import ScoringRules, score
 from uwbbench.results import Report
@@ -35,7 +36,7 @@ def run(tmp_path: Path) -> Run:
             "stability": "false",
             **keys,
         }
-        (tmp_path / "tiny.yaml").write_text("".join(f"{key}: {value}\n" for key, value in lines.items()))
+        (tmp_path / "tiny.yaml").write_text(reseeded("".join(f"{key}: {value}\n" for key, value in lines.items())))
         return run_experiment(read_experiment(tmp_path / "tiny.yaml"), tmp_path / "run", jobs=1)
 
     return make
