@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import uwbbench
+from tests.fixtures.chance import seed
 from uwbbench.api import ConfigError, Obstacle, ScoringError, Truth
 from uwbbench.config.source import open_dataset
 from uwbbench.detect.pipeline import Pipeline, detector_from_yaml
@@ -13,7 +14,7 @@ from uwbbench_detectors.position.ranging import Range, RangeParams
 
 @pytest.fixture(scope="module")
 def short_approach():
-    dataset = open_dataset("approach", {"speed_m_s": 0.9, "seed": 2}, ())
+    dataset = open_dataset("approach", {"start_m": 1.6, "speed_m_s": 0.321, "seed": seed()}, ())
     return dataset.open(dataset.names()[0])
 
 

@@ -44,6 +44,7 @@ if TYPE_CHECKING:
     from uwbbench.api.kernel import Kernel
     from uwbbench.api.locate import find_config
     from uwbbench.api.metric import Metric, Outcome
+    from uwbbench.api.numba_internals import as_tuple
     from uwbbench.api.override import with_values
     from uwbbench.api.radar import CHANNEL_CENTER_HZ, Radar
     from uwbbench.api.registry import load_plugin
@@ -81,6 +82,7 @@ _HOME = {
     "kernel": ("Kernel",),
     "locate": ("find_config",),
     "metric": ("Metric", "Outcome"),
+    "numba_internals": ("as_tuple",),
     "override": ("with_values",),
     "radar": ("CHANNEL_CENTER_HZ", "Radar"),
     "registry": ("load_plugin",),
@@ -143,6 +145,7 @@ __all__ = [
     "Violation",
     "YamlFile",
     "analytic",
+    "as_tuple",
     "bistatic_range",
     "bistatic_range_sine",
     "cases_of",

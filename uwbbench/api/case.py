@@ -8,7 +8,6 @@ registers them as an entry point of the group ``uwbbench.cases``: a tuple of har
 
 from __future__ import annotations
 
-import inspect
 import traceback
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
@@ -16,6 +15,7 @@ from types import ModuleType
 from typing import Any, Literal, Self, TypeVar, get_args
 
 from uwbbench.api.errors import ConfigError, UwbbenchError, nearest
+from uwbbench.api.text import summary
 
 Expectation = Literal["reject", "survive", "equal"]
 """Yield nothing; carry on soundly; or give what a reference gives, within a tolerance."""
@@ -136,8 +136,7 @@ class Check:
     @classmethod
     def named_after(cls, run: Callable[[Any], Evidence | str | None], **facts: Any) -> Self:
         """Check of a function: named like it, and stated by the first paragraph of its docstring."""
-        statement = " ".join(inspect.cleandoc(run.__doc__ or "").partition("\n\n")[0].split())
-        return cls(name=run.__name__.replace("_", "-"), statement=statement, run=run, **facts)
+        return cls(name=run.__name__.replace("_", "-"), statement=summary(run.__doc__), run=run, **facts)
 
     @property
     def asked(self) -> str:

@@ -28,6 +28,12 @@ AUTHORED_KINDS: tuple[AuthoredKind, ...] = get_args(AuthoredKind)
 KINDS: tuple[PluginKind, ...] = ("stages", "detectors", "datasets", "metrics", "terms")
 """Kinds whose names people write in files; kernels step in by themselves."""
 
+_CLASSES = ("stages", "datasets", "metrics", "terms")
+HERE_ALONE = "this process"
+"""Package of what :func:`register` has named."""
+
+_registered: dict[tuple[str, str], type[Any]] = {}
+
 
 @dataclass(frozen=True)
 class Entry:
@@ -70,7 +76,41 @@ def entries(kind: Group) -> dict[str, Entry]:
             found[point.name] = mine
         elif (other.target, other.package) != (mine.target, mine.package):  # one distribution seen twice on the path
             found[point.name] = Entry(other.name, other.target, other.package, (*other.rivals, mine.package))
+    for (of_kind, name), plugin in _registered.items():
+        if of_kind == kind:
+            found[name] = Entry(name, f"{plugin.__module__}:{plugin.__qualname__}", HERE_ALONE)
     return found
+
+
+def register(kind: Literal["stages", "datasets", "metrics", "terms"], name: str, plugin: type[Any]) -> None:
+    """Give a class a name in this process, as an entry point of an installed package does everywhere.
+
+    For scripts and notebooks. Other processes do not know the name: what runs in several, is timed, or is called from
+    the command line needs a package, which ``uwbbench new`` writes.
+
+    Parameters
+    ----------
+    kind : {"stages", "datasets", "metrics", "terms"}
+    name : str
+        A name that was registered here before is given to the new class, as when a cell of a notebook runs again.
+    plugin : type
+        Class of that kind.
+
+    Raises
+    ------
+    PluginError
+        If an installed package has that name, or there is no such kind.
+    """
+    if kind not in _CLASSES:
+        raise PluginError(f"no kind of class '{kind}' can be registered; expected one of {', '.join(_CLASSES)}")
+    if not isinstance(plugin, type):
+        raise PluginError(f"{kind[:-1]} '{name}': expected a class, found {plugin!r}")
+    known = entries(kind).get(name)
+    if known is not None and known.package != HERE_ALONE:
+        raise PluginError(f"{kind[:-1]} '{name}' comes with {known.package}; give yours another name")
+    _registered[kind, name] = plugin
+    entries.cache_clear()
+    load_plugin.cache_clear()
 
 
 def entry(kind: Group, name: str) -> Entry:
@@ -131,6 +171,8 @@ def load_plugin(kind: ClassKind, name: str) -> type[Any]:
 def load_object(kind: ClassKind | Literal["cases"], name: str) -> Any:
     """Whatever is registered by a name, as :func:`load_plugin` does, which asks for a class."""
     found = entry(kind, name)
+    if found.package == HERE_ALONE:
+        return _registered[kind, name]
     module, _, attribute = found.target.partition(":")
     try:
         return getattr(importlib.import_module(module), attribute)

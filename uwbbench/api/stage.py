@@ -10,6 +10,7 @@ from pydantic import BaseModel, ConfigDict
 from uwbbench.api.arrays import BoolArray
 from uwbbench.api.block import Block
 from uwbbench.api.radar import Radar
+from uwbbench.api.text import summary
 from uwbbench.api.truth import Trajectory, Truth
 
 Fidelity = Literal["from-source", "reconstruction", "baseline", "reference"]
@@ -146,7 +147,7 @@ class Stage(Generic[P]):
         return None
 
     def note(self, text: str) -> None:
-        """Tell the reader of the results something, once."""
+        """Add a note for the reader of the results, once."""
         if text not in self.notes:
             self.notes.append(text)
 
@@ -171,5 +172,5 @@ def ports(*names: str) -> frozenset[str]:
 
 
 def describe(cls: type[Any]) -> str:
-    """First line of a plugin's docstring."""
-    return (cls.__doc__ or "").strip().partition("\n")[0]
+    """First paragraph of a plugin's docstring, as lists and reports show it."""
+    return summary(cls.__doc__)

@@ -11,6 +11,7 @@ import typer
 
 from uwbbench.api.errors import ConfigError
 from uwbbench.cli import options, render
+from uwbbench.show.text.numbers import number
 
 if TYPE_CHECKING:
     from uwbbench.api.capture import Capture
@@ -140,7 +141,7 @@ def _blocks(ratio: dict[str, Any]) -> str:
 
 
 def _us(value: float | None, reason: str = "too few calls") -> str:
-    return render.number(value, "us", 2, reason)
+    return number(value, 2, 1.0, "us", reason)
 
 
 def _kind(kind: dict[str, Any] | None) -> str:

@@ -13,8 +13,9 @@ from pydantic.json_schema import models_json_schema
 
 from uwbbench.api import registry
 from uwbbench.api.errors import PluginError
+from uwbbench.config.datasets import DatasetUse
 from uwbbench.config.detector import BY_CHANNEL, DetectorModel, StepModel
-from uwbbench.run.experiment import DatasetUse, ExperimentModel
+from uwbbench.run.experiment import ExperimentModel
 from uwbbench.tools.gate.config import GateModel
 from uwbbench.tools.tune.config import TuneModel
 

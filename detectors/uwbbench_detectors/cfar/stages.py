@@ -165,8 +165,10 @@ class Cfar(Stage[P]):
                 f"cfar.{self.statistic}: some taps with a signal have training taps that are all zero; without noise "
                 "there is no threshold, and nothing is detected in them"
             )
-        found = Detections(row + frames.first, processed=frames.index, tap=tap, amplitude=amplitude, score_db=score_db)
-        return block.replace(detections=found)
+        detections = Detections(
+            row + frames.first, processed=frames.index, tap=tap, amplitude=amplitude, score_db=score_db
+        )
+        return block.replace(detections=detections)
 
 
 class CellAveraging(Cfar[CfarParams]):

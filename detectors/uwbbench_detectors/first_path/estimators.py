@@ -56,7 +56,7 @@ class CrestSearch(FirstPath[S]):
     """
 
     def open(self, radar: Radar) -> None:
-        """Check that there is something to search."""
+        """Check that there are taps to search."""
         super().open(radar)
         if radar.noise_taps >= radar.taps:
             raise ConfigError(f"first path: all {radar.taps} taps precede the first arrival (noise_taps)")

@@ -13,6 +13,14 @@ from uwbbench.api import Block, ConfigError, Detections, FloatArray, Params, Rad
 def profile_start(name: str, skip_taps: int | None, radar: Radar) -> int:
     """First tap of the profile.
 
+    Parameters
+    ----------
+    name : str
+        The stage, for the message.
+    skip_taps : int or None
+        Leading taps left out; None: the radar's ``noise_taps``.
+    radar : Radar
+
     Raises
     ------
     ConfigError

@@ -17,7 +17,8 @@ from uwbbench.api.capture import CaptureHeader
 from uwbbench.api.detections import Detections
 from uwbbench.api.errors import nearest
 from uwbbench.api.metric import Outcome
-from uwbbench.measure.accuracy.judge import SCORINGS, Region, Scene, Scoring, ScoringRules, Table, Verdict, judge
+from uwbbench.config.rules import Scoring, Table
+from uwbbench.measure.accuracy.judge import SCORINGS, Region, Scene, ScoringRules, Verdict, judge
 from uwbbench.measure.accuracy.metrics.detection import F1, FalseAlarmsPerMinute, Precision, Recall
 from uwbbench.measure.accuracy.metrics.error import (
     Bias,
@@ -120,9 +121,9 @@ class Scores:
         return f"Scores({rules.scoring}, gate {rules.gate_m:g} m: {counts}, F1 {block.f1:.3f}, MAE {block.mae_m:.3f} m)"
 
     def _repr_html_(self) -> str:
-        from uwbbench.show import notebook
+        from uwbbench.show.notebook.scores import scores
 
-        return notebook.scores(self)
+        return scores(self)
 
     def __getitem__(self, table: str) -> ScoreBlock | None:
         if table not in get_args(Table):

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 from typing import Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from uwbbench.api import registry
+from uwbbench.config.model import ConfigModel
 
 
-class LatencyModel(BaseModel):
+class LatencyModel(ConfigModel):
     """How calls are timed."""
-
-    model_config = ConfigDict(extra="forbid", populate_by_name=True, allow_inf_nan=False, frozen=True)
 
     enabled: bool = True
     captures: Literal["first", "all"] = Field(default="first", description="Captures of each dataset that are timed.")
