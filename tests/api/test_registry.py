@@ -19,7 +19,7 @@ def test_built_in_plugins_are_registered_like_any_other():
 def test_listing_names_imports_no_plugin_and_no_numpy():
     script = (
         "import json, sys\n"
-        "from uwbbench import registry\n"
+        "from uwbbench.api import registry\n"
         "names = {kind: list(registry.entries(kind)) for kind in registry.KINDS}\n"
         "heavy = ('numpy', 'scipy', 'pandas', 'sklearn', 'h5py', 'uwbbench_detectors', 'uwbbench_datasets')\n"
         "print(json.dumps([names, [name for name in heavy if name in sys.modules]]))\n"

@@ -34,7 +34,7 @@ def run(site: Path, *command: str) -> str:
 def test_its_stage_and_its_detector_are_listed_with_their_package_before_anything_of_it_is_imported(site):
     script = (
         "import json, sys\n"
-        "from uwbbench import registry\n"
+        "from uwbbench.api import registry\n"
         "found = [registry.entry('stages', 'example.energy'), registry.entry('detectors', 'example-energy')]\n"
         "print(json.dumps([[entry.package for entry in found], 'uwbbench_example' in sys.modules]))\n"
     )

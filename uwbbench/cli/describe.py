@@ -50,7 +50,19 @@ def _plugin(kind: Any, name: str) -> dict[str, Any]:
     elif kind == "terms":
         facts["fidelity"] = cls.fidelity
     else:
-        facts |= {key: getattr(cls, key) for key in ("unit", "better", "merge", "minimum_samples")}
+        shown = (
+            "title",
+            "unit",
+            "better",
+            "margin",
+            "merge",
+            "minimum_samples",
+            "default",
+            "order",
+            "brief",
+            "headline",
+        )
+        facts |= {key: getattr(cls, key) for key in shown}
     if kind != "metrics":
         facts["params"] = parameters(cls.params_type())
     return facts
@@ -233,7 +245,7 @@ def checked_file(path: Path) -> str:
         pipeline = load_detector(path if path.is_absolute() else Path.cwd() / path)
         return f"detector '{pipeline.name}', {len(pipeline.config.steps)} steps, fine"
     if "terms" in keys or "trajectory" in keys:
-        captures = open_dataset("simulated", {"scenes": [str(path.resolve())]}, ()).names()
+        captures = open_dataset(registry.default("dataset.scenes"), {"scenes": [str(path.resolve())]}, ()).names()
         return f"scene of {len(captures)} captures, fine"
     first_keys = ["pipeline", "extends", "detectors", "datasets", "terms", "head", "tuning"]
     near = [nearest(str(key), first_keys) for key in keys if key != "schema"]

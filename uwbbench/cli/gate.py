@@ -13,7 +13,7 @@ from uwbbench.api.text import one_line
 from uwbbench.cli import options, render
 
 if TYPE_CHECKING:
-    from uwbbench.tools.gate import Result
+    from uwbbench.tools.gate import GateResult
 
 STEP_SUMMARY = "GITHUB_STEP_SUMMARY"
 
@@ -67,7 +67,7 @@ def _append(path: Path, text: str) -> None:
         file.write(text)
 
 
-def _print(result: Result) -> None:
+def _print(result: GateResult) -> None:
     from uwbbench.tools.gate.publish import COLUMNS, rows
 
     render.print_table(f"gate {one_line(result.gate)}", COLUMNS, rows(result))

@@ -35,28 +35,23 @@ def leaderboard(
     compared where experiment, content of captures and scoring rules agree; times only as ratios to the common
     reference detector.
     """
-    from uwbbench.results.leaderboard import Unverified, read_runs, suites
-    from uwbbench.run.folder.identity import plain
-    from uwbbench.show.site import Content, check_site, rendered, write_site
+    from uwbbench.results.leaderboard import Unverified
+    from uwbbench.tools.leaderboard import leaderboard as put_together
 
-    if output is not None:
-        check_site(output)
     try:
-        verified = read_runs(runs, _progress)
+        made = put_together(runs, output, progress=_progress)
     except Unverified as error:
         if json:
             render.print_json({"problems": error.problems})
         typer.echo(f"error: {error}", err=True)
         raise typer.Exit(CHECK_FAILED) from error
-    content = Content(suites(verified), verified)
     if output is not None:
-        files = rendered(content)
-        write_site(output, files)
-        typer.echo(f"site written to {output}: {len(files)} files, start with {output / 'index.html'}", err=True)
+        typer.echo(f"site written to {output}: {len(made.files)} files, start with {output / 'index.html'}", err=True)
     if json:
-        render.print_json(plain(content.to_dict()))
+        render.print_json(made.to_dict())
         return
     if output is None:
+        content = made.content
         for section in content.sections:
             board = content.board(section.main)
             title = f"{content.names.suite(section.suite)}: {section.title}, {board.title}"

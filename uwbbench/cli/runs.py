@@ -5,7 +5,6 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -13,9 +12,10 @@ import typer
 
 from uwbbench.api.errors import ConfigError
 from uwbbench.cli import options, render
+from uwbbench.show import written
+from uwbbench.show.written import Format
 
 if TYPE_CHECKING:
-    from uwbbench.results import Report
     from uwbbench.run import Progress
     from uwbbench.run.folder import RunFolder
 
@@ -90,25 +90,6 @@ def _progress_bar(quiet: bool) -> Iterator[Callable[[Progress], None] | None]:
         yield advance
 
 
-class Format(StrEnum):
-    """What a report is written as."""
-
-    HTML = "html"
-    MARKDOWN = "md"
-    CSV = "csv"
-    LATEX = "latex"
-    JSON = "json"
-
-
-SUFFIXES = {
-    ".html": Format.HTML,
-    ".htm": Format.HTML,
-    ".md": Format.MARKDOWN,
-    ".tex": Format.LATEX,
-    ".json": Format.JSON,
-}
-
-
 def report(
     run: RunPath,
     output: Annotated[
@@ -132,18 +113,27 @@ def report(
 
     The page is one file that opens offline. Captures that are at hand are opened again to draw their samples.
     """
+    from uwbbench.config.source import data_roots
     from uwbbench.results import Report, read_safely
     from uwbbench.run.folder import RunFolder
+    from uwbbench.show.text import formats
 
     chosen = _format_of(output, form, json=json)
+    roots = data_roots(data_dir)
     with read_safely(run):
         made = Report(RunFolder(run))
         if chosen is None and figures is None:
             render.print_report(made)
         if figures is not None:
-            _write_figures(made, figures, data_dir, force=force)
-        if chosen is not None:
-            _write_report(made, chosen, output, data_dir, force=force)
+            drawn = written.write_figures(made, figures, roots, force=force)
+            typer.echo(f"{len(drawn)} figures written to {figures}", err=True)
+        if chosen is not None and output is not None:
+            written.write(made, output, chosen, roots, force=force)
+            typer.echo(f"report written to {output}", err=True)
+        elif chosen is Format.JSON:
+            render.print_json(formats.as_json(made))
+        elif chosen is not None:
+            typer.echo(written.as_text(made, chosen, roots), nl=False)
 
 
 def _format_of(output: Path | None, form: Format | None, *, json: bool) -> Format | None:
@@ -153,49 +143,12 @@ def _format_of(output: Path | None, form: Format | None, *, json: bool) -> Forma
     if json:
         return Format.JSON
     if form is None and output is not None:
-        form = SUFFIXES.get(output.suffix.lower())
-        if form is None:
-            raise ConfigError(f"{output}: expected a name that ends in {', '.join(SUFFIXES)}, or --format csv")
+        form = written.format_of(output)
     if output is None and form in (Format.HTML, Format.CSV):
         raise ConfigError(
             f"--format {form.value} writes {'a file' if form is Format.HTML else 'a folder'}: name it by -o"
         )
     return form
-
-
-def _write_report(made: Report, form: Format, output: Path | None, data_dir: Path | None, *, force: bool) -> None:
-    from uwbbench.run.folder.files import write_json, write_text
-    from uwbbench.show.text import formats, markdown
-
-    if output is not None:
-        formats.check_replaceable(output, force=force)
-    if form is Format.CSV and output is not None:
-        formats.write_csv(made, output)
-    elif form is Format.JSON:
-        render.print_json(formats.as_json(made)) if output is None else write_json(output, formats.as_json(made))
-    else:
-        text = {Format.MARKDOWN: markdown, Format.LATEX: formats.latex}.get(form)
-        written = _page(made, data_dir) if text is None else text(made)
-        typer.echo(written, nl=False) if output is None else write_text(output, written)
-    if output is not None:
-        typer.echo(f"report written to {output}", err=True)
-
-
-def _page(made: Report, data_dir: Path | None) -> str:
-    from uwbbench.config.source import data_roots
-    from uwbbench.show.page import Content, page
-
-    return page(Content(made, data_roots(data_dir)))
-
-
-def _write_figures(made: Report, folder: Path, data_dir: Path | None, *, force: bool) -> None:
-    from uwbbench.config.source import data_roots
-    from uwbbench.show.page import Content, write_figures
-    from uwbbench.show.text import formats
-
-    formats.check_replaceable(folder, force=force)
-    written = write_figures(Content(made, data_roots(data_dir)), folder)
-    typer.echo(f"{len(written)} figures written to {folder}", err=True)
 
 
 def rescore(
@@ -226,17 +179,14 @@ def rescore(
 
 def _conclude(folder: RunFolder, data_dir: Path | None, *, json: bool) -> None:
     """Write the report into the run folder, as Markdown and as a page, and show its leaderboard."""
+    from uwbbench.config.source import data_roots
     from uwbbench.results import Report, read_safely
-    from uwbbench.show.extras import ReportToolsError
-    from uwbbench.show.text import formats, write_report
+    from uwbbench.show.text import formats
 
     with read_safely(folder.path):
         made = Report(folder)
-        path = write_report(made)
-        try:
-            path = folder.write_text("report.html", _page(made, data_dir))
-        except ReportToolsError as error:
-            typer.echo(f"note: no report.html: {error}", err=True)
+        path, missing = written.write_into_run(made, data_roots(data_dir))
+        render.print_notes([missing] if missing else [])
         if json:
             render.print_json(formats.as_json(made))
             return

@@ -33,8 +33,9 @@ def time(
         typer.Option("--detector", "-d", metavar="NAME|FILE", help="Detector by name or file; may be repeated."),
     ],
     reference: Annotated[
-        str, typer.Option(metavar="NAME|FILE", help="Detector that each takes turns with.")
-    ] = "paper-filtering",
+        str | None,
+        typer.Option(metavar="NAME|FILE", help="Detector that each takes turns with.", show_default="the reference"),
+    ] = None,
     frames: Annotated[int, typer.Option(min=1, metavar="N", help="Frames timed at most.")] = 2000,
     blocks: Annotated[int, typer.Option(min=8, metavar="N", help="Alternating blocks at least.")] = 100,
     paced: Annotated[
@@ -56,11 +57,13 @@ def time(
     machine only.
     """
     import uwbbench
+    from uwbbench.api import registry
     from uwbbench.measure.latency import measure
     from uwbbench.measure.latency.settings import LatencyModel
 
     if rate_hz is not None and paced is None:
         raise ConfigError("--rate-hz is the rate of --paced, which is not given")
+    reference = reference or registry.default("detector.reference")
     ref, opened = _open(capture, receiver, data_dir)
     pipelines = [uwbbench.load_detector(name) for name in detector]
     for pipeline in (*pipelines, uwbbench.load_detector(reference)):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import hashlib
 import importlib.util
+import sys
 from collections.abc import Iterator
 from functools import lru_cache
 from pathlib import Path
@@ -40,11 +41,15 @@ def _contents(module: str) -> Iterator[tuple[str, str]]:
             spec = importlib.util.find_spec(name)
         except ModuleNotFoundError:  # a name inside a module, not a module
             continue
-        if spec is None or spec.origin is None or not spec.origin.endswith(".py"):
+        except ValueError:  # a script that was started by its path; a notebook has no file
+            spec = None
+        origin = getattr(sys.modules.get(name), "__file__", None) if spec is None else spec.origin
+        if origin is None or not origin.endswith(".py"):
             continue
-        path = Path(spec.origin)
+        path = Path(origin)
         known = path.stat()
-        package = name if spec.submodule_search_locations is not None else name.rpartition(".")[0]
+        is_package = spec is not None and spec.submodule_search_locations is not None
+        package = name if is_package else name.rpartition(".")[0]
         content, imported = _read(path, package, known.st_mtime_ns, known.st_size)
         yield name, content
         waiting += imported

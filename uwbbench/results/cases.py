@@ -2,8 +2,8 @@
 
 Conventions
 -----------
-* The detector that leads the dataset's first leaderboard decides: its capture of highest and of lowest F1, or of
-  recall where the truth is not exhaustive. Equal ones: the first by name.
+* The detector that leads the dataset's first leaderboard decides: its best and its worst capture by the metric that
+  ranks. Equal ones: the first by name.
 * A detection is *near* if it lies within the gate of a visible obstacle.
 * Long captures are thinned to what a picture can show; the counts are those of all frames and detections.
 """
@@ -21,7 +21,7 @@ from uwbbench.api.arrays import BoolArray, FloatArray, IntArray
 from uwbbench.api.capture import CaptureHeader
 from uwbbench.api.detections import Detections
 from uwbbench.measure.accuracy.judge import Scene
-from uwbbench.measure.accuracy.metrics.detection import F1, Recall
+from uwbbench.measure.accuracy.metrics.choice import MetricChoice
 from uwbbench.measure.accuracy.scoring import ScoringRules
 from uwbbench.measure.accuracy.stats import evaluate
 from uwbbench.results.ground_truth import Outline, TrueRange, outlines, true_ranges
@@ -101,7 +101,11 @@ class Case:
 
 
 def cases(
-    folder: RunFolder, entries: Sequence[Entry], scored: Sequence[Scored], leaders: dict[tuple[str, str], str]
+    folder: RunFolder,
+    entries: Sequence[Entry],
+    scored: Sequence[Scored],
+    leaders: dict[tuple[str, str], str],
+    metrics: MetricChoice,
 ) -> Iterator[Case]:
     """Best and worst capture of each dataset.
 
@@ -113,6 +117,8 @@ def cases(
     scored : sequence of Scored
     leaders : dict
         Leading detector of each dataset and source.
+    metrics : MetricChoice
+        Of the run.
     """
     rule = folder.rules[0]
     for (dataset, source), leader in list(leaders.items())[:MOST_DATASETS]:
@@ -122,8 +128,12 @@ def cases(
             if (one.dataset, one.source, one.detector) == (dataset, source, leader)
             and (one.scoring, one.table) == (rule.scoring, "filtering")
         ]
-        ranked = sorted(((*_score(one), one.capture) for one in chosen), key=lambda row: (-row[1], row[2]))
-        ranked = [row for row in ranked if not math.isnan(row[1])]
+        names = [metrics.ranking(exhaustive=one.outcome.exhaustive) for one in chosen]
+        rows = [
+            (name, evaluate(metrics[name], [one.outcome]), one.capture) for name, one in zip(names, chosen, strict=True)
+        ]
+        ranked = [row for row in rows if not math.isnan(row[1])]
+        ranked.sort(key=lambda row: (-metrics[row[0]].merit(row[1]), row[2]))
         if not ranked:
             continue
         picks: list[tuple[Literal["best", "worst", "only"], tuple[str, float, str]]]
@@ -133,11 +143,6 @@ def cases(
             about = {"dataset": dataset, "capture": capture, "leader": leader, "which": which}
             about |= {"metric": metric, "scoring": rule.scoring}
             yield _case(folder, of_capture, rule, score, about)
-
-
-def _score(one: Scored) -> tuple[str, float]:
-    name, metric = ("f1", F1) if one.outcome.exhaustive else ("recall", Recall)
-    return name, evaluate(metric, [one.outcome])
 
 
 def _case(folder: RunFolder, entries: Sequence[Entry], rule: ScoringRules, score: float, about: dict[str, Any]) -> Case:

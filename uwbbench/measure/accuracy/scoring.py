@@ -17,7 +17,8 @@ from uwbbench.api.capture import CaptureHeader
 from uwbbench.api.detections import Detections
 from uwbbench.api.errors import nearest
 from uwbbench.api.metric import Outcome
-from uwbbench.measure.accuracy.judge import SCORINGS, Region, Scene, Scoring, ScoringRules, Table, Verdict, judge
+from uwbbench.config.rules import Scoring, Table
+from uwbbench.measure.accuracy.judge import SCORINGS, Region, Scene, ScoringRules, Verdict, judge
 from uwbbench.measure.accuracy.metrics.detection import F1, FalseAlarmsPerMinute, Precision, Recall
 from uwbbench.measure.accuracy.metrics.error import (
     Bias,

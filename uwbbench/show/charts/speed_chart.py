@@ -37,7 +37,9 @@ def speed_against_error(title: str, found: Sequence[Point], names: Mapping[str, 
     ends = [row[side] for row in rows for side in ("left", "right")]
     reach = [min(*ends, frame_period) / 1.25, max(*ends, frame_period) * 1.25]
     span = limits([row[side] for row in rows for side in ("low", "high")], share=0.12)
-    span = [max(span[0], 0.0), min(span[1], 1.01) if quantity.better == "higher" else span[1]]
+    lowest, highest = min(row["low"] for row in rows), max(row["high"] for row in rows)
+    is_share = quantity.better == "higher" and highest <= 1
+    span = [max(span[0], 0.0) if lowest >= 0 else span[0], min(span[1], 1.01) if is_share else span[1]]
     _place_labels(rows, reach, span)
 
     x = {"scale": {"type": "log", "domain": reach, "nice": False}, "axis": {"format": "~g"}}
@@ -88,7 +90,7 @@ def speed_against_error(title: str, found: Sequence[Point], names: Mapping[str, 
             "encoding": {"x": across, "y": up, "text": {"field": "label"}},
         },
     ]
-    better = "up" if quantity.better == "higher" else "down"
+    better = {"higher": "up", "lower": "down", "zero": "towards 0"}[quantity.better]
     subtitle = (
         f"Better: left and {better}. Filled: on the front by its values. P: bootstrap probability of being on it."
     )

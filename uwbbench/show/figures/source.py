@@ -13,6 +13,7 @@ from uwbbench.api.errors import ConfigError, StoreError, nearest
 from uwbbench.api.stage import Filter
 from uwbbench.detect.pipeline import Pipeline
 from uwbbench.measure.accuracy.scoring import ScoringRules
+from uwbbench.results.units import units_of
 from uwbbench.run.folder import RunFolder
 
 
@@ -88,17 +89,7 @@ def from_run(
     StoreError
         If nothing was stored.
     """
-    entries = [entry for entry in folder.entries() if entry.kind == "accuracy" and entry.status == "done"]
-    if not entries:
-        raise StoreError(f"{folder.path}: holds no detections")
-    chosen = entries
-    for what, name in (("detector", detector), ("capture", capture), ("dataset", dataset)):
-        names = {getattr(entry, what) for entry in entries}
-        if name is not None and name not in names:
-            raise ConfigError(f"{folder.path}: has no {what} '{name}'.{nearest(name, names)}")
-        chosen = [entry for entry in chosen if name in (None, getattr(entry, what))]
-    if not chosen:
-        raise ConfigError(f"{folder.path}: detector, capture and dataset exist, but not together")
+    chosen = units_of(folder, "accuracy", detector, capture, dataset)
     steps = {
         config["name"]: [(step["as"], step["use"]) for step in config["pipeline"]]
         for config in folder.manifest["experiment"]["detectors"]

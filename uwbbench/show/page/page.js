@@ -85,14 +85,10 @@
     }
     const quantity = (name) => data.quantities.find((one) => one.name === name);
 
-    const ahead = ["f1", "recall", "precision", "mae", "p95"], timed = ["time ratio", "p50 (us)", "p99 (us)"];
+    const timed = ["time ratio", "p50 (us)", "p99 (us)"];
     const counted = ["captures", "frames (n)", "detections (n)"];
-    const rank = (name) => ahead.includes(name) ? ahead.indexOf(name) : ahead.length;
-    function columnsOf(board) {
-      const open = ["precision", "f1", "false_alarms_per_minute"];
-      return data.quantities.map((one, index) => ({ one, index })).filter(({ one }) => board.exhaustive || !open.includes(one.name))
-        .sort((a, b) => rank(a.one.name) - rank(b.one.name));
-    }
+    const headOf = (one) => one.unit ? `${one.title} (${one.unit})` : one.title;
+    const columnsOf = (board) => board.columns.map((name) => { const one = quantity(name); return { one, index: data.quantities.indexOf(one) }; });
     function cellOf(value, low, high, digits, factor, title) {
       const cell = make("td", shown(value, digits, factor));
       cell.dataset.key = value === null ? "n/a" : String(value);
@@ -113,12 +109,11 @@
       const before = sorted && [sorted.textContent, sorted.getAttribute("aria-sort") === "descending"];
       const head = make("thead"), body = make("tbody"), line = make("tr");
       line.append(make("th", "detector", { scope: "col" }));
-      for (const { one } of columns) line.append(make("th", one.unit ? `${one.title} (${one.unit})` : one.title, { scope: "col", "data-first": one.better === "higher" ? "descending" : "ascending" }));
+      for (const { one } of columns) line.append(make("th", headOf(one), { scope: "col", "data-first": one.better === "higher" ? "descending" : "ascending" }));
       for (const name of [...timed, ...counted]) line.append(make("th", name, { scope: "col" }));
       head.append(line);
-      const recall = data.quantities.findIndex((one) => one.name === "recall");
       const best = columns.map(({ one, index }) => {
-        const known = rows.filter((row) => row[7][recall][0] > 0).map((row) => row[7][index][0]).filter((value) => value !== null);
+        const known = rows.filter((row) => row[8]).map((row) => row[7][index][0]).filter((value) => value !== null);
         if (known.length < 2 || one.better === "zero") return null;
         return one.better === "higher" ? Math.max(...known) : Math.min(...known);
       });
@@ -129,7 +124,7 @@
           const [value, low, high, n, groups] = values[index];
           const title = value === null ? "undefined here: nothing was retained, nothing was to be found, or too few samples" : `n = ${n} ${one.samples}, ${groups} groups`;
           const cell = cellOf(value, low, high, one.digits, one.factor, title);
-          if (value !== null && value === best[place] && values[recall][0] > 0) cell.classList.add("best");
+          if (value !== null && value === best[place] && row[8]) cell.classList.add("best");
           tr.append(cell);
         });
         const times = data.times[board.timing][row[4]];
@@ -138,16 +133,15 @@
           const [ratio, low, high, p50, p99, calls] = times;
           tr.append(cellOf(ratio, low, high, 2, 1, `n = ${calls} calls`), cellOf(p50, null, null, 0, 1, `n = ${calls} calls`), cellOf(p99, null, null, 0, 1, "needs 368 calls"));
         }
-        const errors = data.quantities.findIndex((one) => one.name === "mae");
-        for (const count of [row[5], row[6], values[errors][3]]) tr.append(make("td", String(count)));
+        for (const count of [row[5], row[6], row[9]]) tr.append(make("td", String(count)));
         body.append(tr);
       }
       table.replaceChildren(table.caption ?? make("caption", "Leaderboard", { class: "hidden" }), head, body);
       sortable(table);
-      const first = columns.find(({ one }) => one.name === (board.exhaustive ? "f1" : "recall")).one;
+      const first = quantity(board.main);
       const heads = [...table.tHead.rows[0].cells].map((cell) => cell.textContent);
-      const column = before && heads.includes(before[0]) ? heads.indexOf(before[0]) : heads.indexOf(first.title);
-      if (rows.length) sortBy(table, column, before && heads.includes(before[0]) ? before[1] : true);
+      const column = before && heads.includes(before[0]) ? heads.indexOf(before[0]) : heads.indexOf(headOf(first));
+      if (rows.length) sortBy(table, column, before && heads.includes(before[0]) ? before[1] : first.better === "higher");
       at("board-note").textContent = rows.length ? `${rows.length} detectors, ${board.dataset}, ${board.scoring} scoring, ${board.table}.`
         : cut === undefined ? "No capture of this dataset has this channel with this material." : "No row fits these filters.";
       at("board-missing").replaceChildren(...board.missing.map((text) => make("li", text)));

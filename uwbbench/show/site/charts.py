@@ -7,7 +7,6 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
-from uwbbench.api import registry
 from uwbbench.results.curves import error_curve
 from uwbbench.results.leaderboard.ranking import SETTINGS, Ranking
 from uwbbench.results.pareto import points
@@ -30,11 +29,11 @@ def pareto(ranking: Ranking, metric: str, title: str, names: Mapping[str, str]) 
         for one in ranking.standings
         if one.speed is not None
     }
-    found = points(members, speeds, registry.load_plugin("metrics", metric), SETTINGS)
-    if not found:
+    drawn = points(members, speeds, ranking.metrics[metric], SETTINGS)
+    if not drawn:
         return None
-    quantity = Quantity.of(metric, registry.load_plugin("metrics", metric))
-    return speed_chart.speed_against_error(f"{title}: speed against {quantity.title}", found, names, quantity)
+    quantity = Quantity.of(metric, ranking.metrics[metric])
+    return speed_chart.speed_against_error(f"{title}: speed against {quantity.title}", drawn, names, quantity)
 
 
 def errors(ranking: Ranking, title: str, names: Mapping[str, str]) -> Spec | None:

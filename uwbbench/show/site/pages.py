@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from uwbbench.measure.accuracy.stats import MINIMUM_GROUPS
-from uwbbench.results.leaderboard.ranking import COMPARED, MARGINS, SETTINGS, SIGNIFICANCE, speeds_by_machine
+from uwbbench.results.leaderboard.ranking import SETTINGS, SIGNIFICANCE, speeds_by_machine
 from uwbbench.results.leaderboard.suites import Contender, Suite
 from uwbbench.show.html.render import badge
 from uwbbench.show.site.content import (
-    SHOWN_FIRST,
     VERDICTS,
     Cell,
     Content,
@@ -87,8 +86,8 @@ class Page:
 HOW = (
     f"Rank: one more than the number of detectors that are better by more than chance (Holm-adjusted p below "
     f"{SIGNIFICANCE:g}) and more than the margin. Detectors share ranks.",
-    f"Practically equal: the whole {SETTINGS['confidence']:.0%} interval of the difference lies within the margin, "
-    f"{MARGINS['']:g} of a share or {100 * MARGINS['m']:g} cm of an error. Not told apart: the captures do not decide.",
+    f"Practically equal: the whole {SETTINGS['confidence']:.0%} interval of the difference lies within the metric's "
+    "margin. Not told apart: the captures do not decide.",
     "Pairs are compared on the captures that both were scored on, on the same bootstrap draws of captures; of blocks "
     f"of a second where captures are fewer than {MINIMUM_GROUPS}. Brackets: {SETTINGS['confidence']:.0%} intervals.",
     "Time is only given as a ratio to the common reference detector, measured in alternating blocks on one machine. "
@@ -129,20 +128,33 @@ def _index(content: Content) -> Page:
                     facts=tuple(content.suite_facts(suite)) if place == 0 else (),
                     charts=() if chart is None else (chart,),
                     notes=(none,) if chart is None else (),
-                    tables=(content.board(section.main, SHOWN_FIRST),),
+                    tables=(content.board(section.main, headline=True),),
                     link=(section.address, "All scorings, captures and comparisons"),
                 )
             )
     detectors = len(content.names.detectors)
     lead = f"{detectors} detectors in {len(content.runs)} verified runs. "
     lead += "Only what was measured on the same captures under the same scoring rules is compared."
-    parts.append(Part("How to read it", notes=HOW))
+    parts.append(Part("How to read it", notes=(*HOW, *_margins(content.sections))))
     return Page("index.html", "Leaderboard", badge({one.source for one in content.sections}), lead, tuple(parts))
+
+
+def _margins(sections: Sequence[Section]) -> Iterator[str]:
+    """Differences that do not matter, of each metric that is compared."""
+    margins = {}
+    for section in sections:
+        for pair in section.main.pairs:
+            by = quantity(section.main, pair.metric)
+            margins[by.title] = by.text(section.main.metrics[pair.metric].margin)
+    if margins:
+        yield f"Margins: {', '.join(f'{title} {margin}' for title, margin in margins.items())}."
 
 
 def _dataset(content: Content, section: Section) -> Page:
     suite = section.suite
-    drawn = [content.pareto(section, name) for name in (section.main.main, "mae")] + [content.errors(section)]
+    main = section.main
+    charted = (main.main, *main.metrics.error(exhaustive=main.exhaustive))
+    drawn = [content.pareto(section, name) for name in charted] + [content.errors(section)]
     first = Part(
         title="Speed and error",
         sentences=(content.sentence(section),),
@@ -158,7 +170,7 @@ def _dataset(content: Content, section: Section) -> Page:
     ]
     facts = Part("What was compared", facts=tuple(content.suite_facts(suite)), tables=(_captures(section),))
     lead = f"Dataset of {content.names.suite(suite)}."
-    parts = (first, *boards, facts, Part("How to read it", notes=HOW))
+    parts = (first, *boards, facts, Part("How to read it", notes=(*HOW, *_margins([section]))))
     return Page(section.address, section.label, badge({section.source}), lead, parts)
 
 
@@ -224,7 +236,11 @@ def _detector(content: Content, contender: Contender) -> Page:
 
 
 def _results(content: Content, contender: Contender, sections: list[Section]) -> Table:
-    names = ("f1", "recall", "precision", "mae", "p95")
+    quantities = {
+        name: quantity(section.main, name)
+        for section in sections
+        for name in section.main.metrics.defined(exhaustive=True)
+    }
     rows = []
     for section in sections:
         for ranking in section.rankings:
@@ -238,8 +254,12 @@ def _results(content: Content, contender: Contender, sections: list[Section]) ->
                     Cell("–", key="n/a") if one.rank is None else Cell(f"{one.rank} of {len(ranking.standings)}"),
                 ]
                 captures = Cell(f"{len(one.scored)} of {ranking.captures}")
-                rows.append((*about, *(metric_cell(quantity(name), one.estimates[name]) for name in names), captures))
-    columns = ("dataset", "suite", "scoring", "rank", *(quantity(name).axis for name in names), "captures")
+                cells = [
+                    metric_cell(by, one.estimates[name]) if name in one.estimates else Cell("–", key="n/a")
+                    for name, by in quantities.items()
+                ]
+                rows.append((*about, *cells, captures))
+    columns = ("dataset", "suite", "scoring", "rank", *(by.axis for by in quantities.values()), "captures")
     return Table("On each dataset", columns, tuple(rows))
 
 
@@ -249,7 +269,7 @@ def _others(content: Content, contender: Contender, sections: list[Section]) -> 
         ranking = section.main
         rows = []
         for one in ranking.standings:
-            for name in COMPARED:
+            for name in ranking.headline:
                 pair = ranking.pair(contender.key, one.contender.key, name)
                 if pair is None:
                     continue
@@ -257,8 +277,8 @@ def _others(content: Content, contender: Contender, sections: list[Section]) -> 
                 if pair.better is not None:
                     word = "better" if pair.better == contender.key else "worse"
                 cells = (
-                    Cell(quantity(name).title),
-                    pair_cell(pair),
+                    Cell(quantity(ranking, name).title),
+                    pair_cell(ranking, pair),
                     Cell(p_value(pair.adjusted)),
                     Cell(word),
                 )

@@ -118,5 +118,6 @@ def _false_alarms(table: pd.DataFrame) -> Sheet:
     notes = (
         "Detections a tap of noise alone. Only CFAR stages ask for a rate, and they mean it for 'all' cells over their "
         "threshold and, unless told otherwise, for independent noise; this noise is correlated.",
+        "95 % intervals over frames: alarms in cells of one frame come together.",
     )
     return Sheet(f"{_TITLE}: false alarms", columns, tuple(rows), notes)

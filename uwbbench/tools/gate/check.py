@@ -10,10 +10,11 @@ from typing import Any, Literal
 from uwbbench.run.folder.identity import plain
 from uwbbench.show.text.numbers import number
 
-Kind = Literal["captures", "accuracy", "deadline", "canary", "latency"]
+Aspect = Literal["captures", "accuracy", "deadline", "canary", "latency"]
+"""What a check is about."""
 
 
-class Verdict(StrEnum):
+class GateVerdict(StrEnum):
     """Outcome of a check, and of a gate."""
 
     PASS = "pass"  # noqa: S105 - no password
@@ -24,10 +25,10 @@ class Verdict(StrEnum):
     @property
     def exit_code(self) -> int:
         """Exit code of the command: 0 pass, 1 regression, 2 inconclusive, 3 invalid."""
-        return list(Verdict).index(self)
+        return list(GateVerdict).index(self)
 
 
-_GRAVITY = (Verdict.REGRESSION, Verdict.INVALID, Verdict.INCONCLUSIVE)
+_GRAVITY = (GateVerdict.REGRESSION, GateVerdict.INVALID, GateVerdict.INCONCLUSIVE)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,7 +41,7 @@ class Check:
         A canary compares the base with itself; captures are those that cannot be listed.
     name : str
         What was checked, and on which captures.
-    verdict : Verdict
+    verdict : GateVerdict
     quantity : str
         What the value is, for people.
     value, low, high : float or None
@@ -59,9 +60,9 @@ class Check:
     elapsed_s : float
     """
 
-    kind: Kind
+    kind: Aspect
     name: str
-    verdict: Verdict
+    verdict: GateVerdict
     quantity: str = ""
     value: float | None = None
     low: float | None = None
@@ -95,7 +96,7 @@ class Check:
 
 
 @dataclass(frozen=True)
-class Result:
+class GateResult:
     """All checks of a gate.
 
     Attributes
@@ -116,10 +117,10 @@ class Result:
     machine: dict[str, Any]
 
     @property
-    def verdict(self) -> Verdict:
+    def verdict(self) -> GateVerdict:
         """Gravest verdict of all checks: a proven regression, then what is invalid, then what is inconclusive."""
         found = {check.verdict for check in self.checks}
-        return next((verdict for verdict in _GRAVITY if verdict in found), Verdict.PASS)
+        return next((verdict for verdict in _GRAVITY if verdict in found), GateVerdict.PASS)
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values for JSON."""
