@@ -74,7 +74,11 @@ def parameters(model: Any) -> list[dict[str, Any]]:
     rows = []
     for name, field in schema.get("properties", {}).items():
         required = name in schema.get("required", ())
-        default = "required" if required else _yaml_value(field.get("default", model.model_fields[name].default))
+        default = (
+            "required"
+            if required
+            else _yaml_value(field.get("default", model.model_fields[name].get_default(call_default_factory=True)))
+        )
         row = {"name": name, "type": _type_text(field, schema.get("$defs", {})), "default": default}
         rows.append({**row, "description": without_markup(field.get("description", ""))})
     return rows

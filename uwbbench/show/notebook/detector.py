@@ -34,7 +34,7 @@ def _step(number: int, step: Step) -> str:
     rows = [
         (
             name,
-            _value(step.params.get(name, field.default)),
+            _value(step.params.get(name, field.get_default(call_default_factory=True))),
             "set" if name in step.params else "default",
             without_markup(field.description or ""),
         )
