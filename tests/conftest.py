@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.fixtures.chance import seed
 from uwbbench.api import Capture, registry
 from uwbbench.api.registry import load_plugin
 
@@ -18,7 +19,7 @@ _DATA = Path(os.environ.get("UWBBENCH_DATA", Path(__file__).parents[2] / "shared
 def simulated_approach(**params: object) -> Capture:
     """One run of the built-in simulated approach."""
     adapter = load_plugin("datasets", "approach")
-    dataset = adapter(adapter.params_type().model_validate(params), ())
+    dataset = adapter(adapter.params_type().model_validate({"seed": seed(), **params}), ())
     return dataset.open(dataset.names()[0])
 
 

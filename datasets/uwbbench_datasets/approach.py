@@ -1,6 +1,9 @@
 """A small built-in capture: one plate approached in a straight line, so that a first run needs no download.
 
 Simulated, and labelled so. Direct path, robot-fixed ringing, one plate echo and white noise; no walls, no ghosts.
+
+It is no scene of the simulator, whose terms draw from streams of their own and follow finer models: stored runs and
+gates know these captures by their checksums, which must not change.
 """
 
 from __future__ import annotations

@@ -33,7 +33,7 @@ def find_files(patterns: Iterable[str], folders: Sequence[Path]) -> list[Path]:
     CaptureError
         If a pattern matches no file; names the pattern and the folders that were searched.
     """
-    found: dict[Path, None] = {}
+    paths: dict[Path, None] = {}
     for pattern in patterns:
         wanted = Path(pattern).expanduser()
         places = [Path()] if wanted.is_absolute() else folders
@@ -41,8 +41,8 @@ def find_files(patterns: Iterable[str], folders: Sequence[Path]) -> list[Path]:
         if not matches:
             searched = "" if wanted.is_absolute() else f" in {', '.join(map(str, folders)) or 'no folder at all'}"
             raise CaptureError(f"no file matches '{pattern}'{searched}")
-        found.update(dict.fromkeys(matches))
-    return list(found)
+        paths.update(dict.fromkeys(matches))
+    return list(paths)
 
 
 def _matches(folder: Path, wanted: Path) -> list[Path]:
@@ -53,7 +53,7 @@ def _matches(folder: Path, wanted: Path) -> list[Path]:
 
 
 def short_names(files: Sequence[Path]) -> dict[str, Path]:
-    """Files by their stems, with as many parent folders in front as it takes to tell equal stems apart."""
+    """Files by their stems, with as many parent folders in front as it takes to separate equal stems."""
     named: dict[str, Path] = {}
     for file in files:
         parts = file.with_suffix("").parts
@@ -77,7 +77,7 @@ class CaptureFiles(Dataset[CaptureFilesParams]):
     """Capture files of one's own.
 
     A capture is named after its file, ``stem`` or, where the file has several receivers, ``stem/receiver``; where two
-    files have the same stem, their folders tell them apart. A broken file is listed like any other, so that it shows
+    files have the same stem, their folders separate them. A broken file is listed like any other, so that it shows
     up in results as a failure with its reason.
     """
 
@@ -100,15 +100,15 @@ class CaptureFiles(Dataset[CaptureFilesParams]):
         CaptureError
             If a pattern matches no file.
         """
-        found: list[str] = []
+        names: list[str] = []
         for stem, file in self._files.items():
             try:
                 receivers = list_receivers(file)
             except CaptureError:
-                receivers = ()  # opening it tells what is wrong
+                receivers = ()  # opening it raises the error
             wanted = [name for name in receivers if self.params.receiver in (None, name)]
-            found += [f"{stem}/{name}" for name in wanted] if len(receivers) > 1 and wanted else [stem]
-        return found
+            names += [f"{stem}/{name}" for name in wanted] if len(receivers) > 1 and wanted else [stem]
+        return names
 
     def open(self, name: str) -> Capture:
         """Open one receiver of one file.

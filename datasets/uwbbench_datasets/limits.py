@@ -150,6 +150,8 @@ def _carrier(frames: int, rng: np.random.Generator) -> ComplexArray:
 def _noise(tap_s: FloatArray, frames: int, rng: np.random.Generator) -> ComplexArray:
     """Circular Gaussian noise (frames, taps) of unit power whose autocorrelation is the pulse."""
     power, mode = np.linalg.eigh(PULSE(tap_s[:, None] - tap_s))
-    colour = mode * np.sqrt(np.maximum(power, 0.0) / 2)  # outside the band the power is 0, give or take rounding
+    # The symmetric root: modes alone are arbitrary in sign, and outside the band, where the power is 0 give or take
+    # rounding, in direction too; each processor's linear algebra would choose others, and so draw other noise.
+    colour = mode * np.sqrt(np.maximum(power, 0.0) / 2) @ mode.T
     white = rng.normal(size=(frames, TAPS)) + 1j * rng.normal(size=(frames, TAPS))
-    return np.asarray(white @ colour.T)
+    return np.asarray(white @ colour)

@@ -32,7 +32,7 @@ def _placed(block: Block, radar: Radar, rows: IntArray, range_m: FloatArray, azi
         radar.mount_yaw_rad,
     )
     points_m = to_world(range_m, azimuth_rad, receiver_m, boresight_rad)
-    found = Detections(
+    detections = Detections(
         block.frames.index[rows],
         range_m=range_m,
         azimuth_rad=azimuth_rad,
@@ -40,7 +40,7 @@ def _placed(block: Block, radar: Radar, rows: IntArray, range_m: FloatArray, azi
         x_m=points_m[:, 0],
         y_m=points_m[:, 1],
     )
-    return block.replace(detections=found)
+    return block.replace(detections=detections)
 
 
 class Nothing(Stage[Params]):
@@ -52,11 +52,11 @@ class Nothing(Stage[Params]):
     def open(self, radar: Radar) -> None:
         """Prepare the answer, which is always the same."""
         super().open(radar)
-        self._found = Detections.empty().with_columns(range_m=(), azimuth_rad=(), amplitude=(), x_m=(), y_m=())
+        self._no_detections = Detections.empty().with_columns(range_m=(), azimuth_rad=(), amplitude=(), x_m=(), y_m=())
 
     def step(self, block: Block) -> Block:
         """Block without detections."""
-        return block.replace(detections=self._found)
+        return block.replace(detections=self._no_detections)
 
 
 class ConstantParams(Params):
@@ -91,7 +91,7 @@ class Oracle(Stage[Params]):
     def show_truth(self, truth: Truth, trajectory: Trajectory) -> None:
         """Work out what is seen from each frame."""
         sight = truth.seen_from(self.radar, trajectory)
-        sought = np.array([not thing.structure for thing in truth.objects], dtype=bool)
+        sought = np.array([not obstacle.structure for obstacle in truth.objects], dtype=bool)
         with np.errstate(invalid="ignore"):
             ahead = np.abs(sight.azimuth_rad) <= np.pi / 2
         self._visible = np.isfinite(sight.range_m) & ahead & ~sight.occluded & sought

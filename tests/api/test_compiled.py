@@ -289,6 +289,92 @@ def test_a_change_in_a_module_that_is_called_or_read_is_noticed(
     assert getattr(imported(tmp_path / "caller.py"), function)(0.0) == expected
 
 
+def test_a_source_edited_before_the_first_call_is_not_taken_for_what_was_compiled(source: Path) -> None:
+    module = imported(source)
+    source.write_text(SOURCE.replace("value * SCALE", "value * SCALE * SCALE"))
+    assert module.total(VALUES) == 20.0
+    assert imported(source).total(VALUES) == 40.0
+
+
+def answer(folder: Path, **texts: str) -> str:
+    """What ``kernels.answer()`` gives in a new process, and how much was compiled there, given texts of modules."""
+    for name, text in texts.items():
+        (folder / f"{name}.py").write_text(text)
+    script = (
+        "import kernels\nfrom uwbbench.api.compiling import compile_counts\n"
+        "print(kernels.answer(), compile_counts().fresh)"
+    )
+    places = {**os.environ, "PYTHONPATH": str(folder), "UWBBENCH_CACHE_DIR": str(folder / "kept")}
+    command = [sys.executable, "-B", "-c", script]  # a .pyc counts whole seconds
+    return subprocess.run(command, env=places, capture_output=True, text=True, check=True).stdout.strip()
+
+
+RECORDS = """\
+from typing import NamedTuple
+
+class Own(NamedTuple):
+    near: float
+    far: float
+
+class Pair(NamedTuple):
+    own: Own
+    factor: int
+"""
+NEAREST = """\
+from records import Own, Pair
+from uwbbench.api import compiled
+
+@compiled
+def of_argument(own): return own.near
+
+@compiled
+def of_part(pair): return pair.own.near
+
+@compiled
+def made(near): return Own(near=near, far=2.0)
+
+def answer():
+    own = Own(near=1.0, far=2.0)
+    return of_argument(own), of_part(Pair(own, 3)), made(1.0).near
+"""
+
+
+def test_fields_of_a_named_tuple_of_another_module_that_change_places_are_noticed(tmp_path: Path) -> None:
+    """They are places in memory to machine code: what was compiled for the old order would give the wrong one."""
+    expected = str((1.0,) * 3)
+    assert answer(tmp_path, kernels=NEAREST, records=RECORDS) == f"{expected} 3"
+    swapped = RECORDS.replace("    near: float\n    far: float", "    far: float\n    near: float")
+    assert answer(tmp_path, records=swapped) == f"{expected} 3"
+    assert answer(tmp_path) == f"{expected} 0"
+
+
+STEPS = """\
+from uwbbench.api import compiled
+
+@compiled
+def add(x): return x + 1.0
+
+@compiled
+def scale(x): return x * 10.0
+"""
+CHAIN = """\
+from hub import first, second
+from uwbbench.api import compiled
+
+@compiled
+def chain(x): return second(first(x))
+
+def answer(): return chain(1.0)
+"""
+
+
+def test_names_that_change_their_meaning_in_another_module_are_noticed(tmp_path: Path) -> None:
+    """Neither the function nor those that it calls are edited: only which is called by which name."""
+    hub = "from steps import add as first, scale as second"
+    assert answer(tmp_path, kernels=CHAIN, hub=hub, steps=STEPS) == "20.0 3"
+    assert answer(tmp_path, hub="from steps import add as second, scale as first") == "11.0 1"
+
+
 def test_another_processor_does_not_load_this_ones_machine_code(source: Path) -> None:
     imported(source).total(VALUES)
     script = (

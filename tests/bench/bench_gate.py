@@ -28,11 +28,12 @@ from uwbbench.api import write_capture
 from uwbbench.config.source import CaptureRef, open_dataset
 from uwbbench.measure.accuracy.stats import clopper_pearson
 from uwbbench.measure.latency.machine import load
-from uwbbench.tools.gate.check import Verdict
+from uwbbench.measure.latency.player import turn_frames
+from uwbbench.measure.latency.ratio import Ratio
+from uwbbench.tools.gate.check import GateVerdict
 from uwbbench.tools.gate.config import LatencyGateModel, Side
-from uwbbench.tools.gate.latency import checks_within, turn_size
+from uwbbench.tools.gate.latency import checks_within
 from uwbbench.tools.gate.link import Worker, join, worker_of
-from uwbbench.tools.gate.ratio import Ratio
 
 GATES = 100
 SLOWDOWN = 0.10
@@ -83,12 +84,12 @@ class Tally:
         Measured ratio of each gate that measured one.
     """
 
-    verdicts: Counter[Verdict]
+    verdicts: Counter[GateVerdict]
     ratios: list[float]
 
     def text(self, what: str) -> str:
         """Alarms with their exact 95 % interval, and the other verdicts."""
-        gates, alarms = self.verdicts.total(), self.verdicts[Verdict.REGRESSION]
+        gates, alarms = self.verdicts.total(), self.verdicts[GateVerdict.REGRESSION]
         low, high = clopper_pearson(alarms, gates)
         others = ", ".join(f"{count} {verdict}" for verdict, count in self.verdicts.items())
         spread = "{:.4f} [{:.4f} to {:.4f}]".format(*np.quantile(self.ratios or [np.nan], [0.5, 0, 1]))
@@ -132,8 +133,8 @@ def measured(worker: Worker, base: Side, head: Side, ref: CaptureRef) -> Ratio:
     """Ratio of two detectors from many blocks."""
     sides = {"base": base, "head": head}
     call_s = [join(worker, player, side, ref, SETTINGS.frames, 10)["call_s"] for player, side in sides.items()]
-    asked = {"size": turn_size(min(call_s)), "count": CALIBRATION_BLOCKS}
-    return Ratio.of(np.array(worker.ask("blocks", base="base", head="head", **asked)["log_ratios"]))
+    asked = {"size": turn_frames(call_s), "count": CALIBRATION_BLOCKS}
+    return Ratio.of(worker.ask("blocks", base="base", head="head", **asked)["log_ratios"])
 
 
 def tally(worker: Worker, ref: CaptureRef, base: Side, head: Side, gates: int = GATES) -> Tally:
@@ -144,7 +145,7 @@ def tally(worker: Worker, ref: CaptureRef, base: Side, head: Side, gates: int = 
         found.verdicts[checks[-1].verdict] += 1
         if checks[-1].value is not None:
             found.ratios.append(checks[-1].value)
-        if checks[-1].verdict not in (Verdict.PASS, Verdict.REGRESSION):
+        if checks[-1].verdict not in (GateVerdict.PASS, GateVerdict.REGRESSION):
             print("   ", *(f"{check.kind} {check.verdict} {check.measured_text}" for check in checks), flush=True)
     return found
 
@@ -164,7 +165,7 @@ def main() -> int:
             slower = tally(worker, ref, pair.base, pair.head, gates)
             print(slower.text(f"  head {SLOWDOWN:.0%} slower"))
             print(f"  {time.perf_counter() - started:.0f} s, load {load()}", flush=True)
-            alarms, caught = same.verdicts[Verdict.REGRESSION], slower.verdicts[Verdict.REGRESSION]
+            alarms, caught = same.verdicts[GateVerdict.REGRESSION], slower.verdicts[GateVerdict.REGRESSION]
             kept &= pair.near and alarms == 0 and caught >= math.ceil(0.95 * gates)
     return int(not kept)
 

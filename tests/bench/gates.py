@@ -12,7 +12,7 @@ import numpy as np
 from harness import Effort, Interval, Row, at_least, at_most
 
 from uwbbench.measure.accuracy.stats import clopper_pearson
-from uwbbench.tools.gate.check import Verdict
+from uwbbench.tools.gate.check import GateVerdict
 
 
 def rows(effort: Effort) -> Iterator[Row]:
@@ -32,7 +32,7 @@ def rows(effort: Effort) -> Iterator[Row]:
 
 def _share(tally: bench_gate.Tally) -> Interval:
     """Regressions among the verdicts, with the exact interval of a binomial share."""
-    found, gates = tally.verdicts[Verdict.REGRESSION], tally.verdicts.total()
+    found, gates = tally.verdicts[GateVerdict.REGRESSION], tally.verdicts.total()
     return Interval(found / gates, *clopper_pearson(found, gates))
 
 

@@ -1,13 +1,13 @@
-"""How the targets are measured and told: contenders that take turns, ratios with intervals, one table.
+"""How the targets are measured and shown: contenders that take turns, ratios with intervals, one table.
 
 Conventions
 -----------
-* Times do not travel between machines, and on one machine drift from minute to minute. Contenders take turns in one
-  process; what counts is the ratio within a round. A round runs them forwards and then backwards (ABBA), so that a
-  drift within it meets all alike.
+* Contenders take turns in one process; turns, ratios and intervals are those of :mod:`uwbbench.measure.latency.ratio`,
+  a round being a block.
 * Times are processor times, which other programs on the machine hardly change; elapsed times where threads or processes
   work side by side, and for single calls.
-* A value is the median over the rounds. Its interval is the central 95 % of the medians of resampled rounds.
+* A time is the median over the rounds of the faster turn. The interval of what is no median, such as an exponent, is
+  the central 95 % of its values for resampled rounds.
 * Everything runs pinned to one core unless a target is about two, with the garbage collector off.
 * Contenders must agree before they are timed: a :class:`Disagreement` ends the benchmark with exit code 1, whereas a
   missed target does not.
@@ -22,6 +22,7 @@ import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
+from functools import partial
 from time import process_time
 from typing import Any
 
@@ -29,6 +30,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from uwbbench.api import FloatArray
+from uwbbench.measure.latency.ratio import Ratio, Turn, alternate, median_interval
 
 RESAMPLES = 2000
 TURN_S = 0.02
@@ -132,7 +134,7 @@ def missing(target: str, required: str, why: str) -> Row:
 def interleaved(
     contenders: Mapping[str, Callable[[], Run]], rounds: int, cores: int = 1, clock: Clock = process_time
 ) -> dict[str, FloatArray]:
-    """Seconds (rounds,) of each contender, taking turns.
+    """Seconds (rounds,) of each contender's faster turn.
 
     Parameters
     ----------
@@ -145,18 +147,18 @@ def interleaved(
     clock : function
         ``perf_counter`` where threads or other processes take part.
     """
-    spent = {name: np.zeros((rounds, 2)) for name in contenders}
     with alone(cores):
-        repeats = {}
-        for name, prepare in contenders.items():
+        turns: list[Turn] = []
+        for prepare in contenders.values():
             _seconds(prepare, clock)  # imports and compiles
-            repeats[name] = max(1, min(MOST_REPEATS, round(TURN_S / _seconds(prepare, clock))))
-        for turn in range(rounds):
-            for half, names in enumerate((list(contenders), list(reversed(contenders)))):
-                for name in names:
-                    runs = [_seconds(contenders[name], clock) for _ in range(repeats[name])]
-                    spent[name][turn, half] = np.mean(runs)
-    return {name: times.mean(axis=1) for name, times in spent.items()}
+            repeats = max(1, min(MOST_REPEATS, round(TURN_S / _seconds(prepare, clock))))
+            turns.append(partial(_turn, prepare, clock, repeats))
+        faster_s = alternate(turns, rounds).min(axis=2)
+    return dict(zip(contenders, faster_s.T, strict=True))
+
+
+def _turn(prepare: Callable[[], Run], clock: Clock, repeats: int) -> float:
+    return float(np.mean([_seconds(prepare, clock) for _ in range(repeats)]))
 
 
 def _seconds(prepare: Callable[[], Run], clock: Clock) -> float:
@@ -168,7 +170,7 @@ def _seconds(prepare: Callable[[], Run], clock: Clock) -> float:
 
 def median(values: ArrayLike) -> Interval:
     """Median over the rounds."""
-    return resampled(np.asarray(values, float), np.median)
+    return Interval(*median_interval(values))
 
 
 def once(value: float) -> Interval:
@@ -177,8 +179,9 @@ def once(value: float) -> Interval:
 
 
 def ratio(slow: FloatArray, fast: FloatArray) -> Interval:
-    """Median over the rounds of how many times longer one took than the other."""
-    return median(slow / fast)
+    """How many times longer one took than the other."""
+    found = Ratio.of(np.log(slow / fast))
+    return Interval(found.value, found.low, found.high)
 
 
 def exponent(sizes: Sequence[int], seconds: FloatArray) -> Interval:

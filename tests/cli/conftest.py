@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from tests.fixtures.chance import seed
 from uwbbench.api import Capture, Trajectory, write_capture
 from uwbbench.api.registry import load_plugin
 from uwbbench.cli import app
@@ -61,7 +62,9 @@ def shell(tmp_path: Path) -> Callable[..., subprocess.CompletedProcess[str]]:
 def small_approach(**changes: object) -> Capture:
     """Forty frames of the simulated approach, in memory."""
     adapter = load_plugin("datasets", "approach")
-    params = adapter.params_type().model_validate({"start_m": 2.0, "stop_m": 1.2, "speed_m_s": 1.0, **changes})
+    params = adapter.params_type().model_validate(
+        {"start_m": 2.0, "stop_m": 1.2, "speed_m_s": 1.0, "seed": seed(), **changes}
+    )
     dataset = adapter(params, ())
     return dataset.open(dataset.names()[0])
 

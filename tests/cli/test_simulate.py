@@ -100,4 +100,4 @@ def test_a_grid_behind_lost_frames_is_refused_in_one_message(uwbbench, tmp_path:
     assert lossy != text
     (tmp_path / "lossy.yaml").write_text(lossy)
     said = uwbbench("simulate", "lossy.yaml", "-o", "lossy.h5", code=2).stderr
-    assert "term 'grid' must stand before the terms that lose or repeat frames" in said
+    assert "term 'grid' must come before the terms that lose or repeat frames" in said

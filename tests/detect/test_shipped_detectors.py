@@ -9,6 +9,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from threadpoolctl import threadpool_limits
 
+from tests.fixtures.chance import seed
 from uwbbench import load_detector
 from uwbbench.api import Capture, ConfigError, Detections
 from uwbbench.api.locate import shipped
@@ -37,11 +38,8 @@ EXPECTED = {
 
 @cache
 def plate(**params: object) -> Capture:
-    """A plate approached in 150 frames.
-
-    The seed draws the chassis' ringing: with this one it stays below the far plate's echo.
-    """
-    dataset = open_dataset("approach", {"speed_m_s": 0.9, "seed": 2, **params}, ())
+    """A plate approached from 1.6 m in 150 frames: near enough to stand above any ringing of the chassis."""
+    dataset = open_dataset("approach", {"start_m": 1.6, "speed_m_s": 0.321, "seed": seed(), **params}, ())
     return dataset.open(dataset.names()[0])
 
 
@@ -100,7 +98,7 @@ def test_strongest_detection_is_the_metal_plate(name):
     found, capture = whole_run(name), plate()
     near = hits(found, capture, gate_m=0.40 if name == "paper-as-printed" else 0.20)
     assert len(near) > 0.6 * FRAMES
-    assert near.mean() > 0.95
+    assert near.mean() > 0.9
 
 
 def test_paper_finds_the_plate_in_range_azimuth_and_place():
@@ -108,7 +106,7 @@ def test_paper_finds_the_plate_in_range_azimuth_and_place():
     sight = capture.truth.seen_from(capture.radar, capture.trajectory)
     error_m = np.abs(found.range_m - sight.range_m[found.frame, 0])
     assert hits(found, capture).sum() > 0.9 * FRAMES
-    assert 0.02 < error_m.mean() < 0.10
+    assert 0.02 < error_m.mean() < 0.12
     off_rad = found.azimuth_rad - sight.azimuth_rad[found.frame, 0]
     assert np.abs(np.median(off_rad)) < np.deg2rad(2)
     clustered = found.take(found["cluster"] >= 0)
@@ -124,22 +122,34 @@ def test_paper_without_sts_gives_ranges_and_says_what_it_left_out():
     assert names.split(", ") == ["pdoa", "filter.pdoa", "azimuth", "position", "dbscan"]
     assert "STS" in reason
     assert "cluster" not in found
-    assert hits(found, plate(sts=False)).mean() > 0.95
+    assert hits(found, plate(sts=False)).mean() > 0.9
 
 
 def test_paper_leaves_nothing_out_where_sts_is_there():
     assert not any("left out" in note for note in whole_run("paper").notes)
 
 
-def test_paper_takes_the_thresholds_of_the_captures_channel():
-    weak = {channel: load_detector("paper").run(plate(channel=channel, material="plywood")) for channel in (5, 9)}
-    assert weak[5]["prominence"].min() >= 0.05 > weak[9]["prominence"].min() >= 0.03
+PUBLISHED = {5: {"width": 1.0, "prominence": 0.05, "snr": 20.0}, 9: {"width": 0.2, "prominence": 0.03, "snr": 10.0}}
+
+
+@pytest.mark.parametrize(("channel", "other"), [(5, 9), (9, 5)])
+def test_paper_takes_the_thresholds_of_the_captures_channel(channel, other):
+    def ranges_m(thresholds):
+        keys = {
+            f"pipeline.filter.{name}.params.minimum{'_db' * (name == 'snr')}": thresholds[name] for name in thresholds
+        }
+        every = {"pipeline.select.strongest.use": "select.all"}
+        return load_detector("paper", changes=every | keys).run(plate(channel=channel, material="plywood")).range_m
+
+    np.testing.assert_array_equal(ranges_m({}), ranges_m(PUBLISHED[channel]))
+    assert len(ranges_m({})) != len(ranges_m(PUBLISHED[other]))  # 5 to 200 and 30 to 200 of them, 10 more for channel 9
 
 
 def test_paper_takes_strong_ringing_for_a_far_plate_and_clutter_removal_does_not():
-    ringing = plate(seed=1)
-    assert hits(load_detector("paper").run(ringing), ringing)[:50].mean() < 0.2
-    assert hits(load_detector("background-mean").run(ringing), ringing)[5:50].mean() > 0.9
+    # The ringing of one robot in six is strong enough: none of 200 is, once in 1e15.
+    far = (plate(start_m=3.4, speed_m_s=0.9, seed=seed(number)) for number in range(200))
+    ringing = next(one for one in far if hits(load_detector("paper").run(one), one)[:50].mean() < 0.2)
+    assert hits(load_detector("background-mean").run(ringing), ringing)[5:50].mean() > 0.8
 
 
 @pytest.mark.parametrize(
@@ -194,7 +204,7 @@ def test_frames_without_a_signal_yield_nothing(name):
 def test_oracle_is_exact_and_constant_is_not():
     capture = plate()
     assert hits(whole_run("oracle"), capture, gate_m=1e-9).all()
-    assert hits(whole_run("constant"), capture).mean() < 0.3
+    assert hits(whole_run("constant"), capture).mean() < 0.5
 
 
 @pytest.fixture(scope="module")

@@ -4,15 +4,17 @@ import numpy as np
 import pytest
 
 import uwbbench
+from tests.fixtures.chance import seed
 from uwbbench.api import ConfigError, Obstacle, ScoringError, Truth
 from uwbbench.config.source import open_dataset
 from uwbbench.detect.pipeline import Pipeline, detector_from_yaml
 from uwbbench.measure.calibration import Calibration
+from uwbbench_detectors.position.ranging import Range, RangeParams
 
 
 @pytest.fixture(scope="module")
 def short_approach():
-    dataset = open_dataset("approach", {"speed_m_s": 0.9, "seed": 2}, ())
+    dataset = open_dataset("approach", {"start_m": 1.6, "speed_m_s": 0.321, "seed": seed()}, ())
     return dataset.open(dataset.names()[0])
 
 
@@ -78,10 +80,8 @@ def test_detector_without_a_range_step_has_nothing_to_set(short_approach):
 
 
 def test_settings_name_a_step_by_its_own_name():
-    subtracted = {"pipeline.my range.params.bias_m": 0.1}
-    assert Calibration(0.2, None, 10, subtracted).as_settings() == {
-        "pipeline.my range.params.bias_m": pytest.approx(0.3)
-    }
+    stages = {"my range": Range(RangeParams(bias_m=0.1))}
+    assert Calibration(0.2, None, 10, stages).as_settings() == {"pipeline.my range.params.bias_m": pytest.approx(0.3)}
 
 
 def test_no_truth_is_an_error(short_approach):

@@ -5,7 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy.integrate import quad
+from scipy.stats import norm
 
+from tests.fixtures.chance import SIGMAS, plausible, seed
 from uwbbench.results import Report
 from uwbbench.results.limits import cramer_rao_range_m, rms_bandwidth_hz
 from uwbbench.run import run_experiment
@@ -13,17 +15,19 @@ from uwbbench.run.experiment import read_experiment
 from uwbbench.run.folder.identity import plain
 from uwbbench.show.text import markdown, sheets
 
-EXPERIMENT = """
+EXPERIMENT = f"""
 schema: 1
 detectors:
   - paper-subsample
   - background-mean
-  - {use: cfar-ca, name: cells, set: {pipeline.cfar.ca.params.cells: all, pipeline.cfar.ca.params.noise: correlated}}
+  - use: cfar-ca
+    name: cells
+    set: {{pipeline.cfar.ca.params.cells: all, pipeline.cfar.ca.params.noise: correlated}}
 datasets:
-  - {use: limits, name: echo, params: {scene: echo, snr_db: 20, frames: 1500}}
-  - {use: limits, name: close, params: {scene: pair, snr_db: 25, separation_ns: 1.0, frames: 300}}
-  - {use: limits, name: apart, params: {scene: pair, snr_db: 25, separation_ns: 5.0, frames: 300}}
-  - {use: limits, name: noise, params: {scene: noise, snr_db: 20, frames: 3000}}
+  - {{use: limits, name: echo, params: {{scene: echo, snr_db: 20, frames: 3000, seed: {seed()}}}}}
+  - {{use: limits, name: close, params: {{scene: pair, snr_db: 25, separation_ns: 1.0, frames: 300, seed: {seed()}}}}}
+  - {{use: limits, name: apart, params: {{scene: pair, snr_db: 25, separation_ns: 5.0, frames: 300, seed: {seed()}}}}}
+  - {{use: limits, name: noise, params: {{scene: noise, snr_db: 20, frames: 8000, seed: {seed()}}}}}
 scoring: object
 latency: false
 stability: false
@@ -70,8 +74,10 @@ def test_the_bound_has_the_tabulated_values(snr_db: float, expected_cm: float) -
 def test_no_detector_beats_the_bound_where_all_echoes_are_found(report: Report) -> None:
     table = report.limits.accuracy
     assert table["detector"].tolist() == ["paper-subsample", "background-mean"]
-    assert (table["share"] > 0.99).all()
-    assert table["ratio"].between(1.0, 1.35).all()
+    assert (table["share"] > 0.99).all()  # 18 misses of 1800 where 1 or 2 are expected
+    standard_error = 1 / np.sqrt(2 * table["n"])  # of a root mean square of n errors, relative
+    assert (table["ratio"] > 1 - SIGMAS * standard_error).all()
+    assert (table["ratio"] < 1.2 + SIGMAS * standard_error).all()
 
 
 def test_detection_fails_beside_the_direct_path_only(report: Report) -> None:
@@ -83,21 +89,26 @@ def test_detection_fails_beside_the_direct_path_only(report: Report) -> None:
 
 def test_the_blind_zone_of_the_peak_detector_is_about_the_pulse(report: Report) -> None:
     radius_m = report.limits.blind_zone.set_index("detector")["radius_m"]
+    # Of echoes at 0.2 to 0.3, 0.4, 0.5 and 0.6 m, 0, 35, 82 and 100 % are found; there are 50 in each span.
     assert 0.3 <= radius_m["paper-subsample"] <= 0.5
     assert radius_m["background-mean"] < radius_m["paper-subsample"]
 
 
 def test_two_echoes_are_resolved_when_they_stand_apart(report: Report) -> None:
-    table = report.limits.resolution.set_index(["detector", "separation_ns"])["share"]
-    assert table["background-mean", 5.0] > 0.98
-    assert table["background-mean", 1.0] < 0.2
-    assert table["paper-subsample", 5.0] == 0.0
+    table = report.limits.resolution.set_index(["detector", "separation_ns"])
+    found = (table["share"] * table["n"]).round()["background-mean"]
+    n = table["n"]["background-mean"]
+    assert n[5.0] - found[5.0] in plausible(0.006, n[5.0])
+    assert found[1.0] in plausible(0.07, n[1.0])
+    assert table["share"]["paper-subsample", 5.0] == 0.0
 
 
 def test_measured_false_alarms_agree_with_the_requested_rate(report: Report) -> None:
     row = report.limits.false_alarms.set_index("detector").loc["cells"]
     assert row["requested"] == 1e-3
-    assert row["low"] <= 1e-3 <= row["high"]
+    standard_error = (row["high"] - row["low"]) / (2 * norm.isf(0.025))
+    assert row["share"] == pytest.approx(1e-3, abs=SIGMAS * standard_error)
+    assert standard_error < 0.1 * 1e-3
     assert np.isnan(report.limits.false_alarms.set_index("detector").loc["paper-subsample", "requested"])
 
 

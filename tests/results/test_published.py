@@ -2,6 +2,7 @@
 
 import pytest
 
+from tests.fixtures.chance import reseeded
 from uwbbench.results import Report, published
 from uwbbench.run import run_experiment
 from uwbbench.run.experiment import read_experiment
@@ -19,7 +20,7 @@ DATASETS = "".join(
 def report_on(folder, datasets: str) -> Report:
     folder.mkdir()
     text = f"schema: 1\ndetectors: [paper]\ndatasets:\n{datasets}scoring: peak\nlatency: false\nstability: false\n"
-    (folder / "small.yaml").write_text(text)
+    (folder / "small.yaml").write_text(reseeded(text))
     return Report(run_experiment(read_experiment(folder / "small.yaml"), folder / "run", jobs=1))
 
 

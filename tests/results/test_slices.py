@@ -9,8 +9,9 @@ import pytest
 
 from uwbbench.api.metric import Outcome
 from uwbbench.measure.accuracy.metrics.detection import Recall
+from uwbbench.measure.accuracy.stats import bootstrap
 from uwbbench.results.results import Scored
-from uwbbench.results.slices import MOST_BINS, cuts, estimates_of, range_edges_m, slices
+from uwbbench.results.slices import MOST_BINS, cuts, range_edges_m, slices
 
 SETTINGS: dict[str, Any] = {"resamples": 100, "confidence": 0.95, "seed": 0}
 
@@ -51,7 +52,7 @@ ALL_OF_THEM = [
 
 def made(members: list[Scored]) -> dict[tuple[str, str, str], Any]:
     board = ("s", "simulated", "frame", "filtering")
-    known = {(board, "d"): estimates_of({"recall": Recall}, [one.outcome for one in members], SETTINGS)}
+    known = {(board, "d"): {"recall": bootstrap(Recall, [one.outcome for one in members], **SETTINGS)}}
     found = slices(members, {"recall": Recall}, range_edges_m(members), SETTINGS, known)
     return {(one.channel, one.material, one.span): one for one in found}
 

@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 from joblib.externals.loky import get_reusable_executor
 
+from tests.fixtures.chance import reseeded
 from uwbbench.api import registry
 from uwbbench.run.experiment import Experiment, read_experiment
 
@@ -66,7 +67,7 @@ def make_experiment(tmp_path: Path) -> Callable[..., Experiment]:
         lines = {"schema": 1, "detectors": detectors, "latency": "false", "stability": "false"}
         lines["datasets"] = "[{use: approach, params: {speed_m_s: 3.0}}]"
         path = tmp_path / "tiny.yaml"
-        path.write_text("".join(f"{key}: {value}\n" for key, value in {**lines, **keys}.items()))
+        path.write_text(reseeded("".join(f"{key}: {value}\n" for key, value in {**lines, **keys}.items())))
         return read_experiment(path)
 
     return make

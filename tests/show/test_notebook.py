@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 import uwbbench
 from uwbbench.api import Capture, Detections, Obstacle, Truth
+from uwbbench.api.text import one_line
 from uwbbench.detect.pipeline import detector_from_yaml
 from uwbbench.show.notebook import elements
 
@@ -220,8 +221,7 @@ def test_names_are_escaped_and_cut(approach):
 @given(st.text())
 def test_any_text_reads_back_as_one_line_of_itself(value):
     read = _Markup(f"<p>{elements.text(value)}</p>").text
-    whole = " ".join(value.encode("utf-8", "backslashreplace").decode().split())
-    assert read.split() == (whole if len(whole) <= elements.LONGEST else whole[: elements.LONGEST - 1] + "…").split()
+    assert read.split() == one_line(value, elements.LONGEST).split()
 
 
 def test_a_picture_needs_no_matplotlib(approach, monkeypatch):

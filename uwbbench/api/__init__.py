@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from uwbbench.api.block import Block
     from uwbbench.api.capture import Capture, CaptureHeader, Samples, analytic
     from uwbbench.api.capture_file import list_receivers, open_capture, write_capture
+    from uwbbench.api.case import Evidence, NotApplicable, Violation, cases_of, hard_case
     from uwbbench.api.check import checked
     from uwbbench.api.compiling import compiled, inlined
     from uwbbench.api.dataset import Card, Dataset, DatasetFile
@@ -43,11 +44,13 @@ if TYPE_CHECKING:
     from uwbbench.api.kernel import Kernel
     from uwbbench.api.locate import find_config
     from uwbbench.api.metric import Metric, Outcome
+    from uwbbench.api.numba_internals import as_tuple
     from uwbbench.api.override import with_values
     from uwbbench.api.radar import CHANNEL_CENTER_HZ, Radar
     from uwbbench.api.registry import load_plugin
     from uwbbench.api.stage import Filter, P, Params, Stage, ports
     from uwbbench.api.term import Paths, Pulse, Responses, SceneObject, Term, View
+    from uwbbench.api.trial import StagesOnTrial, exact_ulps
     from uwbbench.api.truth import Obstacle, Sight, Trajectory, Truth
     from uwbbench.api.yaml_file import YamlFile, read_yaml
 
@@ -56,6 +59,7 @@ _HOME = {
     "block": ("Block",),
     "capture": ("Capture", "CaptureHeader", "Samples", "analytic"),
     "capture_file": ("list_receivers", "open_capture", "write_capture"),
+    "case": ("Evidence", "NotApplicable", "Violation", "cases_of", "hard_case"),
     "check": ("checked",),
     "compiling": ("compiled", "inlined"),
     "dataset": ("Card", "Dataset", "DatasetFile"),
@@ -78,11 +82,13 @@ _HOME = {
     "kernel": ("Kernel",),
     "locate": ("find_config",),
     "metric": ("Metric", "Outcome"),
+    "numba_internals": ("as_tuple",),
     "override": ("with_values",),
     "radar": ("CHANNEL_CENTER_HZ", "Radar"),
     "registry": ("load_plugin",),
     "stage": ("Filter", "P", "Params", "Stage", "ports"),
     "term": ("Paths", "Pulse", "Responses", "SceneObject", "Term", "View"),
+    "trial": ("StagesOnTrial", "exact_ulps"),
     "truth": ("Obstacle", "Sight", "Trajectory", "Truth"),
     "yaml_file": ("YamlFile", "read_yaml"),
 }
@@ -103,6 +109,7 @@ __all__ = [
     "Dataset",
     "DatasetFile",
     "Detections",
+    "Evidence",
     "Filter",
     "FloatArray",
     "Frames",
@@ -111,6 +118,7 @@ __all__ = [
     "Limit",
     "LimitFilter",
     "Metric",
+    "NotApplicable",
     "Obstacle",
     "Outcome",
     "P",
@@ -127,20 +135,26 @@ __all__ = [
     "ScoringError",
     "Sight",
     "Stage",
+    "StagesOnTrial",
     "StoreError",
     "Term",
     "Trajectory",
     "Truth",
     "UwbbenchError",
     "View",
+    "Violation",
     "YamlFile",
     "analytic",
+    "as_tuple",
     "bistatic_range",
     "bistatic_range_sine",
+    "cases_of",
     "checked",
     "compiled",
     "direction",
+    "exact_ulps",
     "find_config",
+    "hard_case",
     "inlined",
     "list_receivers",
     "load_plugin",

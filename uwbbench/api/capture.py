@@ -7,7 +7,6 @@ import json
 from collections.abc import Iterator
 from dataclasses import dataclass, field, fields
 from functools import cached_property
-from importlib import import_module
 from typing import Any, Literal, Protocol, runtime_checkable
 
 import numpy as np
@@ -49,7 +48,7 @@ def analytic(real: FloatArray) -> ComplexArray:
 def _finite_frames(samples: Any) -> BoolArray:
     """Mask (frames,) of the rows without NaN and infinity.
 
-    Nearly always all of them are, which one pass over real numbers in memory order tells; only else is each row asked.
+    Nearly always all of them are, which one pass over real numbers in memory order shows; else each row is checked.
     """
     real = samples.view(samples.real.dtype)
     if np.isfinite(real).all():
@@ -89,7 +88,9 @@ class CaptureHeader:
         return f"{type(self).__name__}({self.name!r}, {self.source}: {size})"
 
     def _repr_html_(self) -> str:
-        return str(import_module("uwbbench.show.notebook").capture(self))
+        from uwbbench.show.notebook.capture import capture
+
+        return capture(self)
 
     @property
     def duration_s(self) -> float:
@@ -156,9 +157,9 @@ class Capture(CaptureHeader):
             value = getattr(self, name)
             if value is not None:
                 counts[name] = value.shape[0]
-        for thing in self.truth.objects if self.truth is not None else ():
-            if thing.moves:
-                counts[f"outline of '{thing.name}'"] = len(thing.outline_m)
+        for obstacle in self.truth.objects if self.truth is not None else ():
+            if obstacle.moves:
+                counts[f"outline of '{obstacle.name}'"] = len(obstacle.outline_m)
         wrong = {name: count for name, count in counts.items() if count != frames}
         if wrong:
             raise CaptureError(f"capture '{self.name}': preamble has {frames} frames, but {wrong}")
@@ -247,10 +248,10 @@ class Capture(CaptureHeader):
         arrays: list[Samples | None] = [track.timestamp_s, track.position_m, track.yaw_rad]
         arrays += [getattr(self, name) for name in ("preamble", "sts1", "sts2", *_PER_FRAME)]
         if self.truth is not None:
-            for thing in self.truth.objects:
-                label = [thing.name, thing.material, thing.structure, self.truth.exhaustive]
+            for obstacle in self.truth.objects:
+                label = [obstacle.name, obstacle.material, obstacle.structure, self.truth.exhaustive]
                 digest.update(json.dumps(label).encode())
-                arrays.append(thing.outline_m)
+                arrays.append(obstacle.outline_m)
         for array in arrays:
             digest.update(b"-" if array is None else str(array.shape).encode())
             for start in range(0, 0 if array is None else array.shape[0], 65536):

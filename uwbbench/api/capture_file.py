@@ -50,10 +50,10 @@ class _Reader:
         return CaptureError(f"{self.path}: {where}: {text}")
 
     def group(self, where: str) -> Any:
-        found = self.find(where)
-        if not isinstance(found, h5py.Group):
-            raise self.fail(where, "expected a group, found nothing" if found is None else "expected a group")
-        return found
+        node = self.find(where)
+        if not isinstance(node, h5py.Group):
+            raise self.fail(where, "expected a group, found nothing" if node is None else "expected a group")
+        return node
 
     def find(self, where: str) -> Any:
         """Object at a path, refusing links that leave the file."""
@@ -64,7 +64,7 @@ class _Reader:
             link = here.get(name, getlink=True) if isinstance(here, h5py.Group) else None
             if link is None:
                 return None
-            if not isinstance(link, h5py.HardLink):  # asked of the link itself: a dangling one is not in its group
+            if not isinstance(link, h5py.HardLink):  # checked on the link itself: a dangling one is not in its group
                 raise self.fail(where, "links are not followed; the data must lie in this file")
             here = here[name]
         return here
@@ -106,41 +106,41 @@ class _Reader:
         return value
 
     def dataset(self, where: str, *, required: bool = True) -> h5py.Dataset | None:
-        found = self.find(where)
-        if found is None:
+        node = self.find(where)
+        if node is None:
             if required:
                 raise self.fail(where, "array missing")
             return None
-        if not isinstance(found, h5py.Dataset):
+        if not isinstance(node, h5py.Dataset):
             raise self.fail(where, "expected an array, found a group")
-        if found.external or found.is_virtual:
+        if node.external or node.is_virtual:
             raise self.fail(where, "the array lies in another file; it must lie in this one")
-        return found
+        return node
 
     def samples(self, where: str, kinds: str, shape: tuple[int, int] | None, *, required: bool) -> Samples | None:
         """Array (frames, taps) of samples, memory-mapped where the layout allows it."""
-        found = self.dataset(where, required=required)
-        if found is None:
+        array = self.dataset(where, required=required)
+        if array is None:
             return None
-        if found.ndim != 2 or (shape is not None and found.shape != shape):
-            raise self.fail(where, f"expected shape {shape or '(frames, taps)'}, found {found.shape}")
-        if found.dtype.kind not in kinds:
+        if array.ndim != 2 or (shape is not None and array.shape != shape):
+            raise self.fail(where, f"expected shape {shape or '(frames, taps)'}, found {array.shape}")
+        if array.dtype.kind not in kinds:
             expected = "complex64" if kinds == "c" else "float32 (radar samples are 'rf')"
-            raise self.fail(where, f"expected {expected}, found {found.dtype}")
-        offset = found.id.get_offset()
-        if found.chunks is None and offset is not None and found.size:
-            return MappedSamples(self.path, found.dtype, offset, found.shape)
-        return cast(Samples, found)
+            raise self.fail(where, f"expected {expected}, found {array.dtype}")
+        offset = array.id.get_offset()
+        if array.chunks is None and offset is not None and array.size:
+            return MappedSamples(self.path, array.dtype, offset, array.shape)
+        return cast(Samples, array)
 
     def track(self, where: str, shape: tuple[int, ...], *, required: bool = False) -> FloatArray | None:
         """Per-frame values, read at once."""
-        found = self.dataset(where, required=required)
-        if found is None:
+        array = self.dataset(where, required=required)
+        if array is None:
             return None
-        if found.shape != shape:
-            raise self.fail(where, f"expected shape {shape} (as many frames as the preamble), found {found.shape}")
+        if array.shape != shape:
+            raise self.fail(where, f"expected shape {shape} (as many frames as the preamble), found {array.shape}")
         try:
-            return np.asarray(found[...], dtype=np.float64)
+            return np.asarray(array[...], dtype=np.float64)
         except (TypeError, ValueError, OSError) as error:
             raise self.fail(where, f"expected float64 values: {error}") from error
 
@@ -348,14 +348,14 @@ def _check_belong_together(target: Path, captures: Sequence[Capture]) -> None:
 def _stored(truth: Truth | None) -> list[Any]:
     """All that a file keeps of a truth, as values that compare."""
     objects = truth.objects if truth is not None else ()
-    outlines = [np.asarray(thing.outline_m, np.float64) for thing in objects]
-    labels = [(thing.name, thing.material, thing.structure) for thing in objects]
+    outlines = [np.asarray(obstacle.outline_m, np.float64) for obstacle in objects]
+    labels = [(obstacle.name, obstacle.material, obstacle.structure) for obstacle in objects]
     return [truth and truth.exhaustive, labels, [(outline.shape, outline.tobytes()) for outline in outlines]]
 
 
 def _write(file: h5py.File, captures: Sequence[Capture]) -> None:
     first = captures[0]
-    moves = first.truth is not None and any(thing.moves for thing in first.truth.objects)
+    moves = first.truth is not None and any(obstacle.moves for obstacle in first.truth.objects)
     file.attrs.update({"format": FORMAT, "format_version": "1.1" if moves else "1.0", "name": first.name})
     file.attrs.update({"source": first.source, "license": first.license})
     file.attrs.update({name: text for name in ("citation", "description") if (text := getattr(first, name))})
@@ -367,14 +367,14 @@ def _write(file: h5py.File, captures: Sequence[Capture]) -> None:
         truth = file.create_group("truth")
         truth.attrs["exhaustive"] = first.truth.exhaustive
         truth.create_group("objects")
-        for thing in first.truth.objects:
-            if not _storable(thing.name):
-                raise CaptureError(f"object name '{thing.name}' cannot be stored: it must not be empty or hold '/'")
-            group = truth.create_group(f"objects/{thing.name}")
-            group.attrs["material"] = thing.material
-            if thing.structure:
+        for obstacle in first.truth.objects:
+            if not _storable(obstacle.name):
+                raise CaptureError(f"object name '{obstacle.name}' cannot be stored: it must not be empty or hold '/'")
+            group = truth.create_group(f"objects/{obstacle.name}")
+            group.attrs["material"] = obstacle.material
+            if obstacle.structure:
                 group.attrs["structure"] = True
-            group.create_dataset("outline_m", data=np.asarray(thing.outline_m, np.float64))
+            group.create_dataset("outline_m", data=np.asarray(obstacle.outline_m, np.float64))
 
 
 def _write_receiver(group: h5py.Group, capture: Capture) -> None:

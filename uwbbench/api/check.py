@@ -24,7 +24,7 @@ def checked(model: type[M], data: Any, source: YamlFile, at: Path_ = ()) -> M:
     source : YamlFile
         Where they come from, for the message.
     at : path
-        Where in that file they stand.
+        Keys that lead to them in that file.
 
     Raises
     ------
@@ -54,7 +54,7 @@ def _problem(model: type[BaseModel], data: Any, source: YamlFile, at: Path_, ite
 
 
 def _known_part(data: Any, path: Path_) -> Path_:
-    """Part of an error's path that really stands in the data: unions add their own names to it."""
+    """Part of an error's path that really is in the data: unions add their own names to it."""
     kept: list[str | int] = []
     for part in path:
         if isinstance(data, dict) and part in data:
@@ -72,7 +72,7 @@ def _fields(model: type[BaseModel], path: Path_) -> list[str]:
     here: Any = model
     for part in path:
         candidates = _models_in(here.model_fields[part].annotation) if part in getattr(here, "model_fields", {}) else []
-        named = [found for found in candidates if found.__name__ == part]
+        named = [candidate for candidate in candidates if candidate.__name__ == part]
         if isinstance(part, int) or named:
             here = named[0] if named else here
         elif candidates:
@@ -84,4 +84,4 @@ def _fields(model: type[BaseModel], path: Path_) -> list[str]:
 def _models_in(annotation: Any) -> list[type[BaseModel]]:
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return [annotation]
-    return [found for part in getattr(annotation, "__args__", ()) for found in _models_in(part)]
+    return [model for part in getattr(annotation, "__args__", ()) for model in _models_in(part)]

@@ -5,12 +5,13 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, NamedTuple, TypeVar, cast
+from typing import Any, TypeVar, cast
 
 import numba
 from numba.extending import is_jitted
 
 from uwbbench.api.compiled_files import CompiledFiles
+from uwbbench.api.numba_internals import CompileCounts, counts_of, keep
 
 F = TypeVar("F", bound=Callable[..., object])
 
@@ -69,29 +70,11 @@ def _compiled(function: F, options: dict[str, Any]) -> F:
     if is_jitted(dispatcher):  # numba hands the function itself back where compiling is switched off
         _functions.append(dispatcher)
         if Path(inspect.getfile(function)).is_file():  # nothing tells a stale file of what was typed at a prompt
-            dispatcher._cache = CompiledFiles(function, options)  # type: ignore[attr-defined]
+            keep(dispatcher, CompiledFiles(function, options))
     return cast("F", dispatcher)
-
-
-class CompileCounts(NamedTuple):
-    """How often functions were made ready to run in this process.
-
-    Attributes
-    ----------
-    fresh : int
-        Compiled here, once for each combination of argument types.
-    loaded : int
-        Read from disk.
-    """
-
-    fresh: int
-    loaded: int
 
 
 def compile_counts() -> CompileCounts:
     """Count what this process has compiled, and what it has loaded, so far."""
-    stats = [function.stats for function in _functions]
-    return CompileCounts(
-        fresh=sum(sum(one.cache_misses.values()) for one in stats),
-        loaded=sum(sum(one.cache_hits.values()) for one in stats),
-    )
+    counts = [counts_of(function) for function in _functions]
+    return CompileCounts(fresh=sum(one.fresh for one in counts), loaded=sum(one.loaded for one in counts))

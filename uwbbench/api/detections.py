@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -29,7 +28,7 @@ COLUMNS = (
     "width_taps",
     "pdoa_rad",
 )
-"""Columns of every exported table, in this order; a column nobody computed is empty there."""
+"""Columns of every exported table, in this order; a column that no stage computed is empty there."""
 
 _INTEGER = ("frame", "cluster")
 
@@ -52,7 +51,7 @@ class Detections:
     notes : sequence of str
         What a reader of the results must know, for example stages left out.
     candidates : Detections or callable, optional
-        Every peak before the filters, or a function that finds them when somebody asks.
+        Every peak before the filters, or a function that finds them on demand.
     chain : mapping or callable, optional
         Detections left behind each step of the pipeline, in order, or a function that counts them.
     **columns : (n,) arrays
@@ -92,7 +91,7 @@ class Detections:
         processed: tuple[int, BoolArray],
         notes: Sequence[str],
     ) -> Detections:
-        """Detections from a table made by compiled code, at hardly any cost until somebody looks at them.
+        """Detections from a table made by compiled code, at hardly any cost until they are read.
 
         Parameters
         ----------
@@ -169,17 +168,19 @@ class Detections:
         return f"Detections({len(self)} in {len(self.processed)} frames: {', '.join(self.columns)})"
 
     def _repr_html_(self) -> str:
-        return str(import_module("uwbbench.show.notebook").detections(self))
+        from uwbbench.show.notebook.detections import detections
+
+        return detections(self)
 
     def __contains__(self, column: str) -> bool:
         return column in self.columns
 
     def __getitem__(self, column: str) -> NDArray[Any]:
-        """Column by name; NaN throughout where nobody computed it."""
+        """Column by name; NaN throughout where no stage computed it."""
         if isinstance(self._columns, tuple) and column in self._columns[0]:
             return self._columns[1][:, 1 + self._columns[0].index(column)]
-        found = self.columns.get(column)
-        return np.full(len(self), np.nan) if found is None else found
+        values = self.columns.get(column)
+        return np.full(len(self), np.nan) if values is None else values
 
     @property
     def frame(self) -> IntArray:
@@ -200,7 +201,7 @@ class Detections:
 
     @property
     def candidates(self) -> Detections | None:
-        """Every peak before the filters, found on demand; None where the detector cannot tell."""
+        """Every peak before the filters, found on demand; None where the detector does not give them."""
         if callable(self._candidates):
             self._candidates = self._candidates()
         return self._candidates
@@ -230,7 +231,17 @@ class Detections:
     ) -> Detections:
         """Return the same rows with other facts about them; what is not given stays.
 
-        ``processed`` may be the first frame of a block and a mask of its frames.
+        Parameters
+        ----------
+        processed : (m,) int array, or int and (frames,) bool array, optional
+            Indices of the frames that a detector has looked at, rising; or the first frame of a block and a mask of its
+            frames.
+        notes : sequence of str, optional
+            What a reader of the results must know; replaces the notes there are.
+        candidates : Detections or callable, optional
+            Every peak before the filters, or a function that finds them on demand.
+        chain : mapping or callable, optional
+            Detections left behind each step of the pipeline, in order, or a function that counts them.
         """
         made = self._with(self._columns)
         if processed is not None:

@@ -11,7 +11,7 @@ class UwbbenchError(Exception):
 
 
 class CaptureError(UwbbenchError):
-    """A capture, or the recording behind it, cannot be read or written as asked."""
+    """A capture, or the recording behind it, cannot be read or written as requested."""
 
 
 class ConfigError(UwbbenchError):
@@ -23,7 +23,7 @@ class PluginError(UwbbenchError):
 
 
 class ScoringError(UwbbenchError):
-    """Detections cannot be scored as asked, for example without ground truth."""
+    """Detections cannot be scored as requested, for example without ground truth."""
 
 
 class StoreError(UwbbenchError):

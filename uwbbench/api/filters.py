@@ -1,7 +1,7 @@
 """Filters that declare their rule, so that it can also be evaluated for many thresholds at once.
 
 A filter need not be one of these: any :class:`~uwbbench.api.stage.Filter` says with ``keep`` what it keeps. One that
-only compares columns with parameters, or retains the first few of each frame, says so here and gets ``keep`` for it.
+only compares columns with parameters, or retains the first few of each frame, declares that and gets ``keep`` for it.
 """
 
 from __future__ import annotations
@@ -37,9 +37,9 @@ class Limit:
     side: Literal["least", "most"]
     magnitude: bool = False
 
-    def measure(self, found: Detections) -> FloatArray:
+    def measure(self, detections: Detections) -> FloatArray:
         """Values (n,) that are compared: a larger one never passes less; NaN never passes."""
-        values = np.abs(found[self.column]) if self.magnitude else found[self.column]
+        values = np.abs(detections[self.column]) if self.magnitude else detections[self.column]
         return np.asarray(values if self.side == "least" else -values)
 
     def bound(self, threshold: float | None) -> float:
@@ -80,7 +80,7 @@ R = TypeVar("R", bound=RankParams)
 class RankFilter(Filter[R]):
     """Retains the first few detections of each frame, in an order of its own."""
 
-    def rank(self, found: Detections) -> tuple[FloatArray, ...]:
+    def rank(self, detections: Detections) -> tuple[FloatArray, ...]:
         """Sort keys (n,) of the detections, the most important one first, each rising.
 
         Detections whose first key is NaN cannot be ranked and are not retained.

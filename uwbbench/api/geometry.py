@@ -62,9 +62,23 @@ def receiver_pose(
 def to_world(
     range_m: FloatArray, azimuth_rad: FloatArray, receiver_m: FloatArray, boresight_rad: FloatArray
 ) -> FloatArray:
-    """World points (n, 2) of detections at a range and azimuth from receivers at ``receiver_m`` (n, 3).
+    """World points of detections at a range and azimuth from receivers.
 
     Targets are taken at the receiver's height, as the radar has no elevation.
+
+    Parameters
+    ----------
+    range_m : (n,) array
+    azimuth_rad : (n,) array
+        From boresight, positive to the left.
+    receiver_m : (n, 3) array
+        Receiver positions in the world.
+    boresight_rad : (n,) array
+        Boresight headings in the world.
+
+    Returns
+    -------
+    (n, 2) array
     """
     heading = boresight_rad + azimuth_rad
     ahead = np.stack([np.cos(heading), np.sin(heading)], axis=-1)
@@ -101,8 +115,8 @@ def bistatic_range(excess_m: FloatArray, towards: FloatArray, baseline_m: FloatA
     distance = float(np.linalg.norm(baseline))
     along = towards @ baseline if towards.size else np.zeros(len(excess_m))
     with np.errstate(divide="ignore", invalid="ignore"):
-        found = excess_m * (excess_m + 2 * distance) / (2 * (excess_m + (distance - along)))
-    return np.asarray(np.where(excess_m > 0, found, np.where(excess_m == 0, 0.0, np.nan)))
+        range_m = excess_m * (excess_m + 2 * distance) / (2 * (excess_m + (distance - along)))
+    return np.asarray(np.where(excess_m > 0, range_m, np.where(excess_m == 0, 0.0, np.nan)))
 
 
 def bistatic_range_sine(excess_m: FloatArray, azimuth_rad: FloatArray, distance_m: float) -> FloatArray:
@@ -110,10 +124,24 @@ def bistatic_range_sine(excess_m: FloatArray, azimuth_rad: FloatArray, distance_
 
     Equal to :func:`bistatic_range` only where the transmitter stands in the array plane on the negative-azimuth side,
     ``t = (0, -D, 0)``. Kept to reproduce the paper.
+
+    Parameters
+    ----------
+    excess_m : (n,) array
+        Path length minus the distance between transmitter and receiver.
+    azimuth_rad : (n,) array
+        From boresight, positive to the left.
+    distance_m : float
+        Distance ``D`` between transmitter and receiver.
+
+    Returns
+    -------
+    (n,) array
+        Range in metres; NaN where the path is shorter than the baseline, which no target can cause.
     """
     with np.errstate(divide="ignore", invalid="ignore"):
-        found = excess_m * (excess_m + 2 * distance_m) / (2 * (excess_m + distance_m * (1 + np.sin(azimuth_rad))))
-    return np.asarray(np.where(excess_m > 0, found, np.where(excess_m == 0, 0.0, np.nan)))
+        range_m = excess_m * (excess_m + 2 * distance_m) / (2 * (excess_m + distance_m * (1 + np.sin(azimuth_rad))))
+    return np.asarray(np.where(excess_m > 0, range_m, np.where(excess_m == 0, 0.0, np.nan)))
 
 
 def excess_path(points_m: FloatArray, baseline_m: FloatArray) -> FloatArray:
@@ -165,9 +193,20 @@ def inside(points_m: FloatArray, outline_m: FloatArray) -> BoolArray:
 
 
 def segments_cross(from_m: FloatArray, to_m: FloatArray, outline_m: FloatArray) -> BoolArray:
-    """Whether the open 2-D segment from -> to (n, 2) crosses any edge of an outline (vertices, 2) or (n, vertices, 2).
+    """Whether open 2-D segments cross any edge of an outline.
 
     Touching an end does not count, so that a target never hides behind its own nearest point.
+
+    Parameters
+    ----------
+    from_m, to_m : (n, 2) arrays
+        Ends of the segments.
+    outline_m : (vertices, 2) or (n, vertices, 2) array
+        One closed outline for all segments, or one for each.
+
+    Returns
+    -------
+    (n,) bool array
     """
     outline = np.broadcast_to(outline_m, (len(from_m), *np.shape(outline_m)[-2:]))
     starts, edge = outline, np.roll(outline, -1, axis=1) - outline

@@ -24,11 +24,11 @@ class Kernel(Stage[Params]):
     Parameters
     ----------
     stages : sequence of Stage
-        The opened stages taken over, as many as :meth:`covers` said.
+        The opened stages taken over, as many as :meth:`covers` returned.
     threads : int
         Threads that a long block may be shared among.
     preface : sequence of str
-        Notes that stand before those of the stages.
+        Notes that come before those of the stages.
     """
 
     produces: ClassVar[frozenset[str]] = ports("detections")
@@ -52,7 +52,7 @@ class Kernel(Stage[Params]):
         Parameters
         ----------
         frames : Frames
-            Invalid ones may hold anything.
+            Invalid ones may hold any values.
         first_path : (frames,) array or None
             What an earlier stage made of it; None where the kernel finds it itself.
 

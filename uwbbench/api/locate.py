@@ -24,6 +24,11 @@ def shipped(folder: Folder) -> dict[str, Path]:
     return {path.stem: path for path in sorted((config_folder() / folder).glob("*.yaml"))}
 
 
+def is_path(name: str) -> bool:
+    """Whether a config is named by the path of its file."""
+    return name.endswith((".yaml", ".yml")) or "/" in name or "\\" in name
+
+
 def find_config(folder: Folder, name: str, relative_to: Path | None = None) -> Path:
     """File of a config.
 
@@ -44,7 +49,7 @@ def find_config(folder: Folder, name: str, relative_to: Path | None = None) -> P
     PluginError
         If several packages bring a detector of that name.
     """
-    if name.endswith((".yaml", ".yml")) or "/" in name or "\\" in name:
+    if is_path(name):
         tried = [(relative_to or Path()) / name]
         if name.startswith("configs/"):  # the way the documentation names shipped files, from anywhere
             tried.append(config_folder() / name.removeprefix("configs/"))

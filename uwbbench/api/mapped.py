@@ -49,12 +49,12 @@ class MappedSamples:
         return self.shape[0]
 
     def __getitem__(self, key: Any, /) -> Any:
-        found = self._samples[key]
-        self._handed_out += found.nbytes
+        part = self._samples[key]
+        self._handed_out += part.nbytes
         if self._handed_out > self.kept_bytes and hasattr(mmap, "MADV_DONTNEED"):  # systems without it decide alone
             self._memory.madvise(mmap.MADV_DONTNEED)
             self._handed_out = 0
-        return found
+        return part
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> Any:
         return np.array(self._samples, dtype=dtype, copy=copy)

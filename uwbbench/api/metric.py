@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import ClassVar, Literal
+from typing import ClassVar, Literal, TypeVar
 
 import numpy as np
 
 from uwbbench.api.arrays import BoolArray, FloatArray, IntArray
+
+_Value = TypeVar("_Value", float, FloatArray)
 
 
 @dataclass(frozen=True)
@@ -49,13 +51,50 @@ class Metric:
 
     ``partial`` condenses one outcome; partials of several captures, or of resampled groups, merge by adding
     (``merge = "sum"``) or stacking (``merge = "stack"``); ``value`` turns the merged partial into the number.
-    All are pure functions of their arguments.
+    All are pure functions of their arguments. What tables, charts, comparisons and leaderboards must know of a metric
+    are the attributes below: none of them knows a metric by its name.
+
+    Attributes
+    ----------
+    title : str
+        What people call it; empty: the name under which it is registered.
+    unit : str
+        SI unit of the value, such as ``m``; empty for a share.
+    shown_as : (str, float, int) or None
+        Unit in which people read it, factor to that unit, and decimals; None: metres as centimetres with one decimal,
+        other units with two, shares with three.
+    merge : {"sum", "stack"}
+    better : {"higher", "lower", "zero"}
+        Which end is better. Zero: neither, as for a signed error; such a metric never ranks.
+    margin : float
+        Difference that does not matter, in ``unit``: detectors that differ by less are practically equal.
+    minimum_samples : int
+        With fewer samples the value is undefined.
+    needs_exhaustive_truth : bool
+        Whether it is undefined where the truth does not name all that is visible, as unmatched detections count in it.
+    default : bool
+        Whether every run shows it; others are shown where an experiment lists them under ``metrics``.
+    order : int
+        Place among the columns of a table; equal ones stand in the order in which they are listed.
+    brief : bool
+        Whether a default one also stands in tables that must be narrow: in the terminal, and by channel and material.
+    headline : int or None
+        Place among the few default ones that are charted; the first three of them are compared in pairs, and the first
+        that can ranks. None: not among them. Listed ones always are, and come first.
     """
 
+    title: ClassVar[str] = ""
     unit: ClassVar[str] = ""
+    shown_as: ClassVar[tuple[str, float, int] | None] = None
     merge: ClassVar[Literal["sum", "stack"]] = "sum"
     better: ClassVar[Literal["higher", "lower", "zero"]] = "higher"
+    margin: ClassVar[float] = 0.01
     minimum_samples: ClassVar[int] = 1
+    needs_exhaustive_truth: ClassVar[bool] = False
+    default: ClassVar[bool] = False
+    order: ClassVar[int] = 100
+    brief: ClassVar[bool] = True
+    headline: ClassVar[int | None] = None
 
     @staticmethod
     def partial(outcome: Outcome) -> FloatArray:
@@ -66,6 +105,19 @@ class Metric:
     def value(partial: FloatArray) -> float:
         """Number made of a merged partial; NaN where it is undefined."""
         raise NotImplementedError
+
+    @classmethod
+    def scale(cls) -> tuple[str, float, int]:
+        """Unit in which people read the value, factor to it, and decimals."""
+        usual = {"": ("", 1.0, 3), "m": ("cm", 100.0, 1)}
+        return cls.shown_as or usual.get(cls.unit, (cls.unit, 1.0, 2))
+
+    @classmethod
+    def merit(cls, value: _Value) -> _Value:
+        """Number that is larger where the value is better."""
+        if cls.better == "zero":
+            return -abs(value)
+        return value if cls.better == "higher" else -value
 
     @classmethod
     def resampled(cls, partials: Sequence[FloatArray], counts: FloatArray) -> FloatArray:

@@ -29,7 +29,7 @@ def with_values(data: Mapping[str, Any], changes: Mapping[str, Any], where: str)
         Value by dotted path. An item of a list is addressed by its number, or by the value of its ``as``, ``use`` or
         ``id`` key, even where that holds dots: ``pipeline.filter.width.params.minimum``.
     where : str
-        Who asks, for messages.
+        File or option that asks for the changes, for messages.
 
     Raises
     ------

@@ -2,6 +2,9 @@
 
 Plugins are entry points of six groups: stages, datasets, metrics, terms and kernels are classes; a detector is a YAML
 file in a package, named ``package.module:file.yaml``. Built-in plugins are registered in the same way.
+
+Two more groups say what belongs to plugins, so that the framework names none: ``uwbbench.defaults`` maps a role to the
+plugin that fills it where nobody names one, and ``uwbbench.cases`` holds the hard cases of a package's stages.
 """
 
 from __future__ import annotations
@@ -12,12 +15,17 @@ from dataclasses import dataclass
 from functools import cache
 from importlib.metadata import Distribution, entry_points
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 from uwbbench.api.errors import PluginError, nearest
 
-Kind = Literal["stages", "datasets", "metrics", "terms", "kernels", "detectors"]
-KINDS: tuple[Kind, ...] = ("stages", "detectors", "datasets", "metrics", "terms")
+ClassKind = Literal["stages", "datasets", "metrics", "terms", "kernels"]
+PluginKind = ClassKind | Literal["detectors"]
+Group = PluginKind | Literal["defaults", "cases"]
+AuthoredKind = Literal["stage", "detector", "dataset", "metric"]
+"""Kinds, in the singular, that a package can be written for and that have conformance checks."""
+AUTHORED_KINDS: tuple[AuthoredKind, ...] = get_args(AuthoredKind)
+KINDS: tuple[PluginKind, ...] = ("stages", "detectors", "datasets", "metrics", "terms")
 """Kinds whose names people write in files; kernels step in by themselves."""
 
 _CLASSES = ("stages", "datasets", "metrics", "terms")
@@ -58,7 +66,7 @@ def _package(distribution: Distribution | None) -> str:
 
 
 @cache
-def entries(kind: Kind) -> dict[str, Entry]:
+def entries(kind: Group) -> dict[str, Entry]:
     """All registered names of a kind, sorted; imports nothing."""
     found: dict[str, Entry] = {}
     for point in sorted(entry_points(group=f"uwbbench.{kind}"), key=lambda point: point.name):
@@ -105,7 +113,7 @@ def register(kind: Literal["stages", "datasets", "metrics", "terms"], name: str,
     load_plugin.cache_clear()
 
 
-def entry(kind: Kind, name: str) -> Entry:
+def entry(kind: Group, name: str) -> Entry:
     """Entry of a name.
 
     Raises
@@ -123,8 +131,29 @@ def entry(kind: Kind, name: str) -> Entry:
     return found
 
 
+def default(role: str) -> str:
+    """Registered name of the plugin that fills a role where nobody names one.
+
+    Roles are ``port.PORT``, the stage that makes a port; ``stage.idle``, which finds nothing, and ``stage.constant``,
+    which finds one thing in every frame; ``dataset.files`` and ``dataset.scenes``, which read capture files and scenes,
+    and ``dataset.limits``, the signals that physical limits are known of; ``detector.reference`` of relative times.
+
+    Raises
+    ------
+    PluginError
+        If no installed package fills the role, or two do.
+    """
+    return entry("defaults", role).target
+
+
+def makers() -> dict[str, str]:
+    """Stage that makes each port where nobody names one, by port; imports nothing."""
+    roles = [role for role in entries("defaults") if role.startswith("port.")]
+    return {role.removeprefix("port."): default(role) for role in roles}
+
+
 @cache
-def load_plugin(kind: Literal["stages", "datasets", "metrics", "terms", "kernels"], name: str) -> type[Any]:
+def load_plugin(kind: ClassKind, name: str) -> type[Any]:
     """Class behind a name.
 
     Raises
@@ -132,20 +161,26 @@ def load_plugin(kind: Literal["stages", "datasets", "metrics", "terms", "kernels
     PluginError
         If the name is unknown, claimed twice, or its module cannot be imported; other plugins stay usable.
     """
+    loaded = load_object(kind, name)
+    if not isinstance(loaded, type):
+        found = entry(kind, name)
+        raise PluginError(f"{kind[:-1]} '{name}' of {found.package}: {found.target} is not a class")
+    return loaded
+
+
+def load_object(kind: ClassKind | Literal["cases"], name: str) -> Any:
+    """Whatever is registered by a name, as :func:`load_plugin` does, which asks for a class."""
     found = entry(kind, name)
     if found.package == HERE_ALONE:
         return _registered[kind, name]
     module, _, attribute = found.target.partition(":")
     try:
-        loaded = getattr(importlib.import_module(module), attribute)
+        return getattr(importlib.import_module(module), attribute)
     except Exception as error:  # whatever a plugin's import raises is that plugin's fault alone
         cause = f"{type(error).__name__}: {error}"
         raise PluginError(
             f"{kind[:-1]} '{name}' of {found.package} cannot be loaded from {found.target}: {cause}"
         ) from error
-    if not isinstance(loaded, type):
-        raise PluginError(f"{kind[:-1]} '{name}' of {found.package}: {found.target} is not a class")
-    return loaded
 
 
 def detector_file(name: str) -> Path:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any, ClassVar, Generic, Literal, TypeVar, get_args, get_origin
 
 from pydantic import BaseModel, ConfigDict
@@ -9,6 +10,7 @@ from pydantic import BaseModel, ConfigDict
 from uwbbench.api.arrays import BoolArray
 from uwbbench.api.block import Block
 from uwbbench.api.radar import Radar
+from uwbbench.api.text import summary
 from uwbbench.api.truth import Trajectory, Truth
 
 Fidelity = Literal["from-source", "reconstruction", "baseline", "reference"]
@@ -58,8 +60,17 @@ class Stage(Generic[P]):
     rowwise : bool
         True where each detection's new columns depend on that row and its frame alone. Rejected candidates are then
         described in the same way, for scorings that ask what the filters removed.
+    implied : bool
+        True where the stage may be put into a detector whose file leaves it out, with its defaults and a note: it is
+        the default maker of a port that a step consumes and no step makes.
     fidelity : str
         ``from-source``, ``reconstruction``, ``baseline`` or ``reference``.
+
+    Attributes
+    ----------
+    clusterings : int or None
+        How often the stage has clustered since it was opened, so that those calls can be timed apart; None where it
+        does not cluster.
     """
 
     consumes: ClassVar[frozenset[str]] = frozenset()
@@ -67,7 +78,10 @@ class Stage(Generic[P]):
     removes: ClassVar[frozenset[str]] = frozenset()
     needs: ClassVar[frozenset[str]] = frozenset()
     rowwise: ClassVar[bool] = False
+    implied: ClassVar[bool] = False
     fidelity: ClassVar[Fidelity] = "baseline"
+
+    clusterings: int | None = None
 
     def __init__(self, params: P) -> None:
         self.params: P = params
@@ -83,6 +97,38 @@ class Stage(Generic[P]):
     def wanted(self) -> frozenset[str]:
         """Ports that this stage looks at; overridden where some of its parameters make it look at more."""
         return self.consumes
+
+    @property
+    def every_nth(self) -> bool:
+        """Whether the stage looks at every n-th frame alone, so that its answer hangs on which frames were lost."""
+        return False
+
+    @property
+    def resolves_taps(self) -> float:
+        """Largest distance at which two equal echoes are not taken for noise by each other, by how the method works."""
+        return math.inf
+
+    def recalibrated(self, column: str, offset: float) -> dict[str, float]:  # noqa: ARG002
+        """Parameters of a stage that takes ``offset`` more off a column than this one does.
+
+        Parameters
+        ----------
+        column : str
+            Column of detections, such as ``range_m``.
+        offset : float
+            In SI units.
+
+        Returns
+        -------
+        dict
+            Values by the names of parameters; empty where the stage takes no offset off this column.
+
+        Raises
+        ------
+        ConfigError
+            If nothing can be added to what the parameters say; the message starts with the name of the parameter.
+        """
+        return {}
 
     def open(self, radar: Radar) -> None:
         """Start a stream: set the state that lives between blocks. Overriders call this first."""
@@ -101,7 +147,7 @@ class Stage(Generic[P]):
         return None
 
     def note(self, text: str) -> None:
-        """Tell the reader of the results something, once."""
+        """Add a note for the reader of the results, once."""
         if text not in self.notes:
             self.notes.append(text)
 
@@ -126,5 +172,5 @@ def ports(*names: str) -> frozenset[str]:
 
 
 def describe(cls: type[Any]) -> str:
-    """First line of a plugin's docstring."""
-    return (cls.__doc__ or "").strip().partition("\n")[0]
+    """First paragraph of a plugin's docstring, as lists and reports show it."""
+    return summary(cls.__doc__)

@@ -246,7 +246,22 @@ class Term(Generic[P]):
         return None
 
     def apply(self, responses: Responses, view: View, rng: np.random.Generator) -> Responses:  # noqa: ARG002
-        """Change a block's responses: what a receiver does to the sum of all paths."""
+        """Change a block's responses: what a receiver does to the sum of all paths.
+
+        Parameters
+        ----------
+        responses : Responses
+            Sum of all paths as the terms before this one left it, arrays (frames, taps).
+        view : View
+            The same frames.
+        rng : Generator
+            The term's own stream for this block.
+
+        Returns
+        -------
+        Responses
+            Of the same shape.
+        """
         return responses
 
     def record(self, capture: Capture, rng: np.random.Generator) -> Capture:  # noqa: ARG002

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from importlib import import_module
 
 import numpy as np
 
@@ -99,7 +98,9 @@ class Truth:
         return f"Truth({len(self.objects)} objects, {'exhaustive' if self.exhaustive else 'not exhaustive'})"
 
     def _repr_html_(self) -> str:
-        return str(import_module("uwbbench.show.notebook").truth(self))
+        from uwbbench.show.notebook.capture import truth
+
+        return truth(self)
 
     def seen_from(self, radar: Radar, trajectory: Trajectory) -> Sight:
         """Range and azimuth of every object from every pose of the receiver.
@@ -123,16 +124,16 @@ class Truth:
         range_m = np.full((frames, len(self.objects)), np.nan)
         azimuth_rad = np.full_like(range_m, np.nan)
         occluded = np.zeros(range_m.shape, bool)
-        for column, thing in enumerate(self.objects):
-            dimensions = thing.outline_m.shape[-1]
-            point = nearest_on_outline(receiver_m[:, :dimensions], thing.outline_m)
+        for column, obstacle in enumerate(self.objects):
+            dimensions = obstacle.outline_m.shape[-1]
+            point = nearest_on_outline(receiver_m[:, :dimensions], obstacle.outline_m)
             offset = np.zeros((frames, 3))
             offset[:, :dimensions] = point - receiver_m[:, :dimensions]
             local = rotate_z(offset, -boresight_rad)
             range_m[:, column] = np.linalg.norm(offset, axis=1)
             azimuth_rad[:, column] = np.arctan2(local[:, 1], local[:, 0])
             for other in self.objects:
-                if other is not thing and other.outline_m.shape[-2] > 1:
+                if other is not obstacle and other.outline_m.shape[-2] > 1:
                     flat = other.outline_m[..., :2]
                     occluded[:, column] |= segments_cross(receiver_m[:, :2], point[:, :2], flat)
         return Sight(range_m, azimuth_rad, occluded)
@@ -140,7 +141,7 @@ class Truth:
     def distance_to(self, points_m: FloatArray, frame: np.ndarray) -> FloatArray:
         """Distance (n, objects) from world points (n, 2), seen in the given frames, to each outline; 0 inside."""
         distance = np.full((len(points_m), len(self.objects)), np.nan)
-        for column, thing in enumerate(self.objects):
-            outline = thing.outline_at(frame)[..., :2]
+        for column, obstacle in enumerate(self.objects):
+            outline = obstacle.outline_at(frame)[..., :2]
             distance[:, column] = np.linalg.norm(points_m - nearest_on_outline(points_m, outline), axis=1)
         return distance

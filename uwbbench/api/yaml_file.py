@@ -95,7 +95,7 @@ def read_yaml(path: Path) -> YamlFile:
 
 
 def parse_yaml(text: str, name: str) -> YamlFile:
-    """Parse YAML text; ``name`` stands for the file in messages."""
+    """Parse YAML text; ``name`` is that of the file in messages."""
     try:
         loader = _Loader(text)
         node = loader.get_single_node()
@@ -144,15 +144,15 @@ class _Builder:
             raise ConfigError(f"{self.name}:{line}: '{node.value}' is not a valid {kind}") from error
 
     def _mapping(self, node: Any, path: Path_) -> dict[Any, Any]:
-        found: dict[Any, Any] = {}
+        values: dict[Any, Any] = {}
         for key_node, value_node in node.value:
             line = key_node.start_mark.line + 1
             if not isinstance(key_node, yaml.ScalarNode):
                 raise ConfigError(f"{self.name}:{line}: a key must be a single word or number")
             key = self._scalar(key_node)
             key = key_node.value if key is None or isinstance(key, bool | float) else key
-            if key in found:
+            if key in values:
                 raise ConfigError(f"{self.name}:{line}: key '{dotted((*path, key))}' is given twice")
             self.lines[(*path, key)] = line
-            found[key] = self.value(value_node, (*path, key))
-        return found
+            values[key] = self.value(value_node, (*path, key))
+        return values

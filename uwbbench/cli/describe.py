@@ -9,6 +9,7 @@ from typing import Any
 from uwbbench.api import registry
 from uwbbench.api.errors import ConfigError, PluginError, nearest
 from uwbbench.api.locate import find_config, shipped
+from uwbbench.api.text import without_markup
 from uwbbench.api.yaml_file import read_yaml
 
 _CLASSES = ("stages", "datasets", "metrics", "terms")
@@ -37,7 +38,8 @@ def everything_named(name: str) -> dict[str, dict[str, Any]]:
 
 def _plugin(kind: Any, name: str) -> dict[str, Any]:
     cls, entry = registry.load_plugin(kind, name), registry.entry(kind, name)
-    facts: dict[str, Any] = {"package": entry.package, "target": entry.target, "doc": inspect.getdoc(cls) or ""}
+    doc = without_markup(inspect.getdoc(cls) or "")
+    facts: dict[str, Any] = {"package": entry.package, "target": entry.target, "doc": doc}
     if kind == "stages":
         facts["fidelity"] = cls.fidelity
         facts |= {port: sorted(getattr(cls, port)) for port in ("consumes", "produces", "removes", "needs")}
@@ -48,7 +50,19 @@ def _plugin(kind: Any, name: str) -> dict[str, Any]:
     elif kind == "terms":
         facts["fidelity"] = cls.fidelity
     else:
-        facts |= {key: getattr(cls, key) for key in ("unit", "better", "merge", "minimum_samples")}
+        shown = (
+            "title",
+            "unit",
+            "better",
+            "margin",
+            "merge",
+            "minimum_samples",
+            "default",
+            "order",
+            "brief",
+            "headline",
+        )
+        facts |= {key: getattr(cls, key) for key in shown}
     if kind != "metrics":
         facts["params"] = parameters(cls.params_type())
     return facts
@@ -62,7 +76,7 @@ def parameters(model: Any) -> list[dict[str, Any]]:
         required = name in schema.get("required", ())
         default = "required" if required else _yaml_value(field.get("default", model.model_fields[name].default))
         row = {"name": name, "type": _type_text(field, schema.get("$defs", {})), "default": default}
-        rows.append({**row, "description": field.get("description", "")})
+        rows.append({**row, "description": without_markup(field.get("description", ""))})
     return rows
 
 
@@ -227,7 +241,7 @@ def checked_file(path: Path) -> str:
         pipeline = load_detector(path if path.is_absolute() else Path.cwd() / path)
         return f"detector '{pipeline.name}', {len(pipeline.config.steps)} steps, fine"
     if "terms" in keys or "trajectory" in keys:
-        captures = open_dataset("simulated", {"scenes": [str(path.resolve())]}, ()).names()
+        captures = open_dataset(registry.default("dataset.scenes"), {"scenes": [str(path.resolve())]}, ()).names()
         return f"scene of {len(captures)} captures, fine"
     first_keys = ["pipeline", "extends", "detectors", "datasets", "terms", "head", "tuning"]
     near = [nearest(str(key), first_keys) for key in keys if key != "schema"]

@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from uwbbench.api import registry
+from uwbbench.api.text import printable
 from uwbbench.cli import render
-from uwbbench.show.text.sheet import interval, number, shown
-from uwbbench.show.text.wording import TITLES, scale
+from uwbbench.show.text.numbers import interval, number
+from uwbbench.show.text.quantity import Quantity
+from uwbbench.show.text.sheet import shown
 
 if TYPE_CHECKING:
     from uwbbench.results.comparison import Comparison
@@ -44,25 +45,23 @@ def _value(value: Any) -> str:
         return "none"
     text = value if isinstance(value, str) else json.dumps(value)
     text = text[:12] if len(text) == 64 and set(text) <= set("0123456789abcdef") else text
-    line = "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
-    return line if len(line) <= LONGEST_VALUE else f"{line[:LONGEST_VALUE]}..."
+    return printable(text, LONGEST_VALUE)
 
 
 def _scores(found: Comparison) -> None:
     rows = []
     for one in found.changed_scores:
         dataset, source, scoring, table = one.board
-        unit, digits, factor = scale(registry.load_plugin("metrics", one.metric).unit)
-        d = one.difference
+        by, d = Quantity.of(one.metric, found.metrics[one.metric]), one.difference
         rows.append(
             (
                 f"{shown(dataset)}, {source.upper()}",
                 f"{scoring}, {table}",
                 shown(one.detector),
-                f"{TITLES.get(one.metric, one.metric)}{unit}",
-                number(one.before, digits, factor),
-                number(one.after, digits, factor),
-                interval(d.value, d.low, d.high, digits, factor),
+                by.axis,
+                number(one.before, by.digits, by.factor),
+                number(one.after, by.digits, by.factor),
+                interval(d.value, d.low, d.high, by.digits, by.factor),
                 number(one.adjusted, 3),
                 f"{one.captures} captures, {d.groups} groups",
             )

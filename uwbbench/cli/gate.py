@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from uwbbench.api.errors import StoreError
+from uwbbench.api.text import one_line
 from uwbbench.cli import options, render
 
 if TYPE_CHECKING:
-    from uwbbench.tools.gate import Result
+    from uwbbench.tools.gate import GateResult
 
 STEP_SUMMARY = "GITHUB_STEP_SUMMARY"
 
@@ -66,8 +67,8 @@ def _append(path: Path, text: str) -> None:
         file.write(text)
 
 
-def _print(result: Result) -> None:
-    from uwbbench.tools.gate.publish import COLUMNS, one_line, rows
+def _print(result: GateResult) -> None:
+    from uwbbench.tools.gate.publish import COLUMNS, rows
 
     render.print_table(f"gate {one_line(result.gate)}", COLUMNS, rows(result))
     render.print_facts({"head": one_line(result.head), "base": one_line(result.base)})

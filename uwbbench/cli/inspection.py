@@ -15,7 +15,7 @@ from uwbbench.cli import options, render
 USAGE_ERROR = 2
 
 
-class Kind(StrEnum):
+class ListedKind(StrEnum):
     """What can be listed."""
 
     STAGES = "stages"
@@ -36,7 +36,7 @@ class File(StrEnum):
 
 
 def list_names(
-    kind: Annotated[Kind | None, typer.Argument(help="Only this kind.", show_default=False)] = None,
+    kind: Annotated[ListedKind | None, typer.Argument(help="Only this kind.", show_default=False)] = None,
     json: options.Json = False,
 ) -> None:
     """List what is installed. Nothing of it is loaded."""

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import json
-import math
 import sys
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import typer
 
+from uwbbench.show.text.numbers import number
+
 if TYPE_CHECKING:
+    from uwbbench.api.metric import Metric
     from uwbbench.results import Report
 
 NOT_A_TERMINAL_WIDTH = 1000
@@ -20,21 +22,6 @@ NOT_A_TERMINAL_WIDTH = 1000
 def print_json(value: Any) -> None:
     """Print one JSON value and nothing else; undefined numbers must be None already."""
     typer.echo(json.dumps(value, indent=2, allow_nan=False))
-
-
-def number(value: float | None, unit: str = "", digits: int = 3, reason: str = "undefined") -> str:
-    """Number with its unit, or ``n/a`` and why.
-
-    Examples
-    --------
-    >>> number(0.12345, "m")
-    '0.123 m'
-    >>> number(float("nan"), reason="nothing retained")
-    'n/a (nothing retained)'
-    """
-    if value is None or not math.isfinite(value):
-        return f"n/a ({reason})"
-    return f"{value:.{digits}f} {unit}".rstrip()
 
 
 def print_table(title: str, columns: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
@@ -71,14 +58,14 @@ def print_scores(result: Mapping[str, Any]) -> None:
     label = "SIMULATED capture" if result["source"] == "simulated" else "capture"
     typer.echo(f"{result['detector']} on {label} '{result['capture']}', {result['frames']} frames")
     tables = [name for name in ("filtering", "mapping") if result[name] is not None]
-    rows = [[text, *(_score(result[name], key, unit) for name in tables)] for key, text, unit in _SCORES]
+    rows = [[title, *cells] for title, cells in _scores([result[name] for name in tables])]
     title = f"scoring '{result['scoring']}', gate {result['gate_m']:g} m"
     print_table(title, ["", *(f"after {name}" for name in tables)], rows)
     if result["mapping"] is None:
         typer.echo("after mapping: n/a (the detector does not cluster positions)")
     times = result["latency_us"]
     if times is not None:
-        shown = [f"{key} {number(times[key], 'us', 1, 'too few calls')}" for key in _TIMES]
+        shown = [f"{key} {number(times[key], 1, 1.0, 'us', 'too few calls')}" for key in _TIMES]
         typer.echo(f"time a frame, one frame a call ({times['n']} calls): {', '.join(shown)}")
     print_notes(result["notes"])
 
@@ -86,45 +73,37 @@ def print_scores(result: Mapping[str, Any]) -> None:
 _TIMES = ("p50", "p90", "p95", "p99", "amortised", "deadline")
 
 
-_SCORES = (
-    ("precision", "precision", ""),
-    ("recall", "recall", ""),
-    ("f1", "F1", ""),
-    ("mae_m", "MAE", "cm"),
-    ("p90_m", "P90", "cm"),
-    ("p95_m", "P95", "cm"),
-    ("sd_m", "SD", "cm"),
-    ("matched_mae_m", "MAE of true positives", "cm"),
-    ("chance_recall", "recall by chance", ""),
-    ("false_alarms_per_minute", "false alarms a minute", ""),
-    ("tp", "true positives", None),
-    ("fp", "false positives", None),
-    ("fn", "misses", None),
-    ("retained", "retained", None),
-    ("unmatched", "unmatched", None),
-)
+def _scores(blocks: Sequence[Mapping[str, Any]]) -> Iterator[tuple[str, list[str]]]:
+    """Title of each score, and its text in each table."""
+    from uwbbench.measure.accuracy.metrics.choice import MetricChoice
+    from uwbbench.run.folder.scored import column_of
+    from uwbbench.show.text.quantity import Quantity
+
+    for name, metric in MetricChoice().items():
+        key, by = column_of(name, metric.unit), Quantity.of(name, metric)
+        if all(key in block for block in blocks):  # those of other packages are known to experiments only
+            texts = [None if block[key] is None else by.text(block[key]) for block in blocks]
+            yield (
+                by.title,
+                [text or f"n/a ({_why_undefined(metric, block)})" for text, block in zip(texts, blocks, strict=True)],
+            )
+    yield "recall by chance", [number(block["chance_recall"], 3, reason="not defined here") for block in blocks]
+    for key, title in _COUNTS.items():
+        yield title, [str(block[key]) for block in blocks]
 
 
-def _score(block: Mapping[str, Any], key: str, unit: str | None) -> str:
-    if unit is None:
-        return str(block[key])
-    value = block[key]
-    if unit == "cm":
-        return number(None if value is None else value * 100, unit, 1, reason=_why_undefined(block, key))
-    return number(value, unit, reason=_why_undefined(block, key))
+_COUNTS = {"tp": "true positives", "fp": "false positives", "fn": "misses", "retained": "retained"}
+_COUNTS |= {"unmatched": "unmatched"}
 
 
-def _why_undefined(block: Mapping[str, Any], key: str) -> str:
+def _why_undefined(metric: type[Metric], block: Mapping[str, Any]) -> str:
     """Why a score is undefined, by the conventions of :mod:`uwbbench.measure.accuracy.metrics`."""
-    if not block["exhaustive"] and key in ("precision", "f1", "false_alarms_per_minute"):
+    if metric.needs_exhaustive_truth and not block["exhaustive"]:
         return "truth not exhaustive"
-    if key == "chance_recall":
-        return "not defined here"
-    if key == "recall":
-        return "nothing to find"
-    if key in ("p90_m", "p95_m") and block["retained"]:
-        return "too few samples"
-    return "no frames" if not block["frames"] else "nothing retained"
+    if not block["frames"]:
+        return "no frames"
+    missing = {"nothing retained": block["retained"], "nothing to find": block["tp"] + block["fn"]}
+    return " and ".join(reason for reason, count in missing.items() if not count) or "too few samples"
 
 
 def print_report(report: Report) -> None:
@@ -141,21 +120,26 @@ def print_report(report: Report) -> None:
 
 def print_leaderboard(report: Report) -> None:
     """Print how the detectors did on each dataset, best first, and what did not work."""
+    from uwbbench.show.text.quantity import Quantity, undefined_titles
+
+    quantities = Quantity.of_all(report.metrics.brief)
     groups: dict[str, list[list[str]]] = {}
     open_world: set[str] = set()
-    for about, found in report.estimates:
+    for about, estimates in report.estimates:
         title = f"{about['dataset']}, {about['source'].upper()}"
         if not about["exhaustive"]:
             open_world.add(title)
-        numbers = [_short(found[name].value * scale, digits) for name, _, scale, digits in _LEADERBOARD]
-        others = [_short(about["p50_us"], 0), _short(about["chance_recall"], 3)]
+        numbers = [number(estimates[name].value, by.digits, by.factor) for name, by in quantities.items()]
+        others = [number(about["p50_us"], 0), number(about["chance_recall"], 3)]
         groups.setdefault(title, []).append([about["scoring"], about["table"], about["detector"], *numbers, *others])
-    columns = ["scoring", "after", "detector", *(title for _, title, _, _ in _LEADERBOARD), "p50 (us)", "chance recall"]
+    heads = [by.axis for by in quantities.values()]
+    columns = ["scoring", "after", "detector", *heads, "p50 (us)", "chance recall"]
     for title, rows in groups.items():
         shown = slice(None) if title in open_world else slice(-1)
         print_table(title, columns[shown], [row[shown] for row in rows])
         if title in open_world:
-            typer.echo("  truth not exhaustive: no precision and F1; errors are of matches; compare recall with chance")
+            missing = undefined_titles(report.metrics)
+            typer.echo(f"  truth not exhaustive: no {missing}; errors are of matches; compare recall with chance")
         elif any("n/a" in row[shown] for row in rows):
             typer.echo("  n/a: undefined, as nothing was retained, nothing was to be found, or samples are too few")
     failed, unscored = len(report.failures), len(report.unscored)
@@ -167,18 +151,3 @@ def print_leaderboard(report: Report) -> None:
     print_notes(report.notes)
     if failed or unscored:
         typer.echo(f"{failed} units failed, {unscored} could not be scored", err=True)
-
-
-_LEADERBOARD = (
-    ("precision", "precision", 1, 3),
-    ("recall", "recall", 1, 3),
-    ("f1", "F1", 1, 3),
-    ("mae", "MAE (cm)", 100, 1),
-    ("p90", "P90 (cm)", 100, 1),
-    ("p95", "P95 (cm)", 100, 1),
-    ("sd", "SD (cm)", 100, 1),
-)
-
-
-def _short(value: float, digits: int) -> str:
-    return f"{value:.{digits}f}" if math.isfinite(value) else "n/a"

@@ -15,12 +15,13 @@ from uwbbench.cli import options, render
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from uwbbench.tools.check import Conformance, Kind
+    from uwbbench.api.registry import AuthoredKind
+    from uwbbench.tools.check import Conformance
 
 CHECK_FAILED = 1
 
 
-class PluginKind(StrEnum):
+class KindOption(StrEnum):
     """What can be made and checked."""
 
     STAGE = "stage"
@@ -30,7 +31,7 @@ class PluginKind(StrEnum):
 
 
 def new(
-    kind: Annotated[PluginKind, typer.Argument(help="What to make.", show_default=False)],
+    kind: Annotated[KindOption, typer.Argument(help="What to make.", show_default=False)],
     name: Annotated[str, typer.Argument(help="Name to register, such as clutter.mine.", show_default=False)],
     output: Annotated[
         Path, typer.Option("--output", "-o", metavar="DIR", help="Folder that the package's own folder goes into.")
@@ -54,7 +55,7 @@ def check(
         str | None, typer.Argument(help="Stage, detector, dataset or metric; or a detector file.", show_default=False)
     ] = None,
     kind: Annotated[
-        PluginKind | None, typer.Option(help="Only this kind, where several bear the name.", show_default=False)
+        KindOption | None, typer.Option(help="Only this kind, where several bear the name.", show_default=False)
     ] = None,
     only: Annotated[
         list[str] | None,
@@ -74,10 +75,11 @@ def check(
     Each failure is explained: what was expected, what was found, and where to read more. Exits with 1 if a check fails.
     """
     from uwbbench.api.override import parse_settings
+    from uwbbench.api.registry import AUTHORED_KINDS
     from uwbbench.config.source import data_roots
-    from uwbbench.tools.check import KINDS, examine, kinds_of, subject_of
+    from uwbbench.tools.check import examine, kinds_of, subject_of
 
-    kinds = (kind.value,) if kind else KINDS if name is None else kinds_of(name)
+    kinds = (kind.value,) if kind else AUTHORED_KINDS if name is None else kinds_of(name)
     if show_checks:
         _list(kinds, json=json)
         return
@@ -95,10 +97,10 @@ def check(
         raise typer.Exit(CHECK_FAILED)
 
 
-def _list(kinds: Iterable[Kind], *, json: bool) -> None:
+def _list(kinds: Iterable[AuthoredKind], *, json: bool) -> None:
     from uwbbench.tools.check import all_checks
 
-    listed = {kind: [(one.name, one.statement, one.read_more) for one in all_checks(kind)] for kind in kinds}
+    listed = {kind: [(one.name, one.asked, one.read_more) for one in all_checks(kind)] for kind in kinds}
     columns = ("check", "what and why", "read more")
     if json:
         render.print_json(
@@ -110,7 +112,7 @@ def _list(kinds: Iterable[Kind], *, json: bool) -> None:
 
 
 def _print(found: Conformance, *, traceback: bool) -> None:
-    rows = [(one.check, one.status, one.detail or one.found) for one in found.results]
+    rows = [(one.check.name, one.status, one.detail or one.found) for one in found.results]
     render.print_table(f"{found.kind} {found.name}", ("check", "outcome", "detail"), rows)
     for one in found.results:
         if not one.passed:

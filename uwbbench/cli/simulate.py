@@ -21,6 +21,7 @@ def simulate(
     json: options.Json = False,
 ) -> None:
     """Simulate a scene into a capture file."""
+    from uwbbench.api import registry
     from uwbbench.api.capture_file import write_capture
     from uwbbench.api.locate import find_config
     from uwbbench.api.override import parse_settings
@@ -29,7 +30,7 @@ def simulate(
     options.format_of(output, ".h5")
     path = find_config("scenes", scene).resolve()
     params = {"scenes": [str(path)], "set": parse_settings(settings or ()), "runs": run}
-    dataset: Any = open_dataset("simulated", params, [path.parent])
+    dataset: Any = open_dataset(registry.default("dataset.scenes"), params, [path.parent])
     names = [name for name in dataset.runs() if name.endswith(f"/{run}")]
     if len(names) > 1:
         shown = ", ".join(name.split("/")[1] for name in names[:6])

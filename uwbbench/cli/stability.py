@@ -41,7 +41,7 @@ def stability(
 
 
 def _print(found: Stability) -> None:
-    rows = [(one.case, f"{one.expectation}: {one.statement}", one.status, one.detail) for one in found.outcomes]
+    rows = [(one.check.name, one.check.asked, one.status, one.detail or one.found) for one in found.results]
     render.print_table(f"hard cases for {found.detector}", ("case", "expected", "outcome", "detail"), rows)
     figures = found.summary()
     counts = f"{figures['passed']} passed, {figures['failed']} failed, {figures['not_applicable']} not applicable"

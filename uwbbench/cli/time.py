@@ -11,6 +11,7 @@ import typer
 
 from uwbbench.api.errors import ConfigError
 from uwbbench.cli import options, render
+from uwbbench.show.text.numbers import number
 
 if TYPE_CHECKING:
     from uwbbench.api.capture import Capture
@@ -32,8 +33,9 @@ def time(
         typer.Option("--detector", "-d", metavar="NAME|FILE", help="Detector by name or file; may be repeated."),
     ],
     reference: Annotated[
-        str, typer.Option(metavar="NAME|FILE", help="Detector that each takes turns with.")
-    ] = "paper-filtering",
+        str | None,
+        typer.Option(metavar="NAME|FILE", help="Detector that each takes turns with.", show_default="the reference"),
+    ] = None,
     frames: Annotated[int, typer.Option(min=1, metavar="N", help="Frames timed at most.")] = 2000,
     blocks: Annotated[int, typer.Option(min=8, metavar="N", help="Alternating blocks at least.")] = 100,
     paced: Annotated[
@@ -55,11 +57,13 @@ def time(
     machine only.
     """
     import uwbbench
+    from uwbbench.api import registry
     from uwbbench.measure.latency import measure
     from uwbbench.measure.latency.settings import LatencyModel
 
     if rate_hz is not None and paced is None:
         raise ConfigError("--rate-hz is the rate of --paced, which is not given")
+    reference = reference or registry.default("detector.reference")
     ref, opened = _open(capture, receiver, data_dir)
     pipelines = [uwbbench.load_detector(name) for name in detector]
     for pipeline in (*pipelines, uwbbench.load_detector(reference)):
@@ -137,7 +141,7 @@ def _blocks(ratio: dict[str, Any]) -> str:
 
 
 def _us(value: float | None, reason: str = "too few calls") -> str:
-    return render.number(value, "us", 2, reason)
+    return number(value, 2, 1.0, "us", reason)
 
 
 def _kind(kind: dict[str, Any] | None) -> str:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -13,17 +15,9 @@ from uwbbench.api import registry
 from uwbbench.api.check import checked
 from uwbbench.api.errors import ConfigError, PluginError
 from uwbbench.api.locate import find_config
-from uwbbench.api.override import merged, with_values
+from uwbbench.api.override import with_values
 from uwbbench.api.yaml_file import YamlFile, parse_yaml, read_yaml
-
-IMPLIED = {
-    "profile": "profile.minmax",
-    "first_path": "first_path.crest",
-    "noise": "noise_floor",
-    "score_db": "score.snr",
-    "range_m": "range",
-}
-"""Stages that are put in, with their defaults and a note, where a step uses a port that no step of the file makes."""
+from uwbbench.config.extends import extended
 
 BY_CHANNEL = "by_channel"
 """Key of a parameter whose value depends on the capture's channel: ``{by_channel: {5: 1.0, 9: 0.2, other: 0.2}}``."""
@@ -124,6 +118,27 @@ class DetectorConfig:
         return {"schema": 1, "name": self.name, "fidelity": self.fidelity, "pipeline": steps}
 
 
+KERNEL = "kernel "
+"""What the names of kernels begin with among the names of sources."""
+
+
+def detector_identity(config: Mapping[str, Any], sources: Mapping[str, str]) -> str:
+    """SHA-256 over a resolved detector and the sources of its stages.
+
+    Parameters
+    ----------
+    config : mapping
+        As :meth:`DetectorConfig.to_dict` gives it.
+    sources : mapping of str to str
+        SHA-256 of the sources of each stage by its name, and of each kernel, which may stand for some, by its name
+        behind ``KERNEL``. Those of other stages do not count.
+    """
+    used = {step["use"]: sources[step["use"]] for step in config["pipeline"]}
+    used |= {name: sha256 for name, sha256 in sources.items() if name.startswith(KERNEL)}
+    text = json.dumps({"detector": config, "sources": used}, sort_keys=True)
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
 def read_detector(
     name: str, relative_to: Path | None = None, changes: Mapping[str, Any] | None = None
 ) -> DetectorConfig:
@@ -145,7 +160,7 @@ def read_detector(
     """
     path = find_config("detectors", name, relative_to)
     source = read_yaml(path)
-    data = _extended(source, path.parent, (path.resolve(),))
+    data = extended(source, "detectors", path)
     if changes:
         data = with_values(data, changes, "--set")
     return check_detector(data, source)
@@ -154,26 +169,7 @@ def read_detector(
 def detector_from_text(text: str, name: str = "detector") -> DetectorConfig:
     """Detector from YAML text, as :func:`read_detector` does from a file."""
     source = parse_yaml(text, name)
-    return check_detector(_extended(source, Path(), ()), source)
-
-
-def _extended(source: YamlFile, folder: Path, seen: tuple[Path, ...]) -> dict[str, Any]:
-    data = dict(source.data)
-    parent = data.get("extends")
-    if parent is None:
-        return data
-    if not isinstance(parent, str):
-        raise ConfigError(f"{source.place(('extends',))}: expected the name or path of a detector, found {parent!r}")
-    path = find_config("detectors", parent, folder)
-    if path.resolve() in seen:
-        raise ConfigError(f"{source.place(('extends',))}: detectors extend each other in a circle")
-    base = _extended(read_yaml(path), path.parent, (*seen, path.resolve()))
-    changes = data.pop("set", None) or {}
-    if not isinstance(changes, dict):
-        raise ConfigError(f"{source.place(('set',))}: expected values by path")
-    base.pop("extends", None)
-    data.pop("extends")
-    return merged(with_values(base, changes, source.place(("set",))), data)
+    return check_detector(extended(source, "detectors"), source)
 
 
 def check_detector(data: Mapping[str, Any], source: YamlFile) -> DetectorConfig:
@@ -206,8 +202,8 @@ def _completed(steps: list[Step]) -> list[Step]:
 
     def put(step: Step) -> None:
         for port in sorted(registry.load_plugin("stages", step.use).consumes - made):
-            use = IMPLIED.get(port)
-            if use in registry.entries("stages") and use not in taken:
+            use = _implied(port)
+            if use is not None and use not in taken:
                 made.update(registry.load_plugin("stages", use).produces)
                 taken.add(use)
                 put(Step(use, use, place=step.place, implied_by=step.label))
@@ -216,6 +212,12 @@ def _completed(steps: list[Step]) -> list[Step]:
     for step in steps:
         put(step)
     return whole
+
+
+def _implied(port: str) -> str | None:
+    """Stage that is put in, with its defaults and a note, where no step of a file makes a port; None for none."""
+    use = registry.makers().get(port)
+    return use if use in registry.entries("stages") and registry.load_plugin("stages", use).implied else None
 
 
 def _with_named_channels(params: Mapping[str, Any], source: YamlFile, index: int) -> dict[str, Any]:

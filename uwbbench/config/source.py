@@ -97,4 +97,4 @@ class CaptureRef:
         whole = path.resolve()
         params = {"files": [str(whole)], **({"receiver": receiver} if receiver else {})}
         name = whole.stem if receiver is None else f"{whole.stem}/{receiver}"
-        return cls("capture", params, (str(whole.parent),), name)
+        return cls(registry.default("dataset.files"), params, (str(whole.parent),), name)

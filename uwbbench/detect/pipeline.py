@@ -3,11 +3,8 @@
 from __future__ import annotations
 
 import contextlib
-import hashlib
-import json
 from collections.abc import Iterator, Mapping
 from functools import cache
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +17,7 @@ from uwbbench.api.detections import COLUMNS, Detections
 from uwbbench.api.errors import ConfigError, PluginError
 from uwbbench.api.kernel import Kernel
 from uwbbench.api.stage import Stage
-from uwbbench.config.detector import DetectorConfig, detector_from_text, read_detector
+from uwbbench.config.detector import KERNEL, DetectorConfig, detector_from_text, detector_identity, read_detector
 from uwbbench.detect.sources import source_hash
 from uwbbench.detect.stream import Opened, Stream
 
@@ -61,7 +58,9 @@ class Pipeline:
         return f"Pipeline({self.name}: {' -> '.join(step.label for step in self.config.steps)})"
 
     def _repr_html_(self) -> str:
-        return str(import_module("uwbbench.show.notebook").detector(self))
+        from uwbbench.show.notebook.detector import detector
+
+        return detector(self)
 
     def _check_ports(self) -> None:
         available = {"frames"}
@@ -208,8 +207,7 @@ class Pipeline:
     @property
     def identity(self) -> str:
         """SHA-256 over the resolved configuration and the sources of its stages."""
-        text = json.dumps({"detector": self.config.to_dict(), "sources": self.sources}, sort_keys=True)
-        return hashlib.sha256(text.encode()).hexdigest()
+        return detector_identity(self.config.to_dict(), self.sources)
 
     @property
     def sources(self) -> dict[str, str]:
@@ -219,7 +217,7 @@ class Pipeline:
         }
         for name in registry.entries("kernels"):
             with contextlib.suppress(PluginError):  # one that cannot be loaded is not used
-                found[f"kernel {name}"] = source_hash(registry.load_plugin("kernels", name).__module__)
+                found[f"{KERNEL}{name}"] = source_hash(registry.load_plugin("kernels", name).__module__)
         return found
 
 

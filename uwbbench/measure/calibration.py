@@ -8,19 +8,15 @@ from typing import Any
 
 import numpy as np
 
+from uwbbench.api import registry
 from uwbbench.api.capture import Capture
 from uwbbench.api.errors import ConfigError, ScoringError
 from uwbbench.api.geometry import wrap_angle
+from uwbbench.api.stage import Stage
 from uwbbench.detect.pipeline import Pipeline
 
 MINIMUM_MATCHES = 10
 """Fewest detections that an offset is taken from."""
-
-_OFFSETS: dict[str, dict[str, Any]] = {
-    "range": {"bias_m": 0.0},
-    "azimuth": {"bias_deg": 0.0, "bias_domain": "theta"},
-}
-"""Parameters that hold offsets, by stage, with their defaults."""
 
 
 @dataclass(frozen=True)
@@ -35,14 +31,14 @@ class Calibration:
         Median error of the azimuth; None where fewer than 10 matched detections have one.
     n : int
         Detections that the range offset was taken from.
-    subtracted : mapping
-        What the detector takes off already, by the path of the parameter, as its file says.
+    stages : mapping
+        The detector's stages with its parameters for the channel of the capture, by the names of their steps.
     """
 
     range_bias_m: float
     azimuth_bias_rad: float | None
     n: int
-    subtracted: Mapping[str, Any] = field(default_factory=dict, repr=False)
+    stages: Mapping[str, Stage[Any]] = field(default_factory=dict, repr=False)
 
     def as_settings(self) -> dict[str, float]:
         """Values for the ``set:`` of a detector that extends the calibrated one, by path.
@@ -53,20 +49,29 @@ class Calibration:
         Raises
         ------
         ConfigError
-            If the detector has no ``range`` step, subtracts a preset instead of a number, or subtracts its azimuth
-            offset from the phase difference.
+            If not exactly one step takes an offset off the range or off the azimuth, or nothing can be added to what
+            it takes off: a preset instead of a number, say, or an offset of the phase difference.
         """
-        ranging = _path_of("range", self.subtracted)
-        settings = {f"{ranging}.bias_m": _number(f"{ranging}.bias_m", self.subtracted) + self.range_bias_m}
-        if self.azimuth_bias_rad is not None:
-            azimuth = _path_of("azimuth", self.subtracted)
-            if self.subtracted[f"{azimuth}.bias_domain"] != "theta":
-                raise ConfigError(
-                    f"{azimuth}.bias_domain: an offset of the azimuth can be set in the domain 'theta' alone"
-                )
-            offset_deg = float(np.rad2deg(self.azimuth_bias_rad))
-            settings[f"{azimuth}.bias_deg"] = _number(f"{azimuth}.bias_deg", self.subtracted) + offset_deg
-        return settings
+        settings = self._added("range_m", self.range_bias_m)
+        return (
+            settings if self.azimuth_bias_rad is None else settings | self._added("azimuth_rad", self.azimuth_bias_rad)
+        )
+
+    def _added(self, column: str, offset: float) -> dict[str, float]:
+        """Values by path with which the detector takes an offset more off a column."""
+        changes: dict[str, dict[str, float]] = {}
+        for label, stage in self.stages.items():
+            try:
+                changes[label] = stage.recalibrated(column, offset)
+            except ConfigError as error:
+                raise ConfigError(f"pipeline.{label}.params.{error}") from error
+        steps = [label for label, changed in changes.items() if changed]
+        if len(steps) != 1:
+            raise ConfigError(
+                f"the detector has {len(steps)} steps that take an offset off {column}; "
+                "an offset can be set where there is one"
+            )
+        return {f"pipeline.{steps[0]}.params.{name}": value for name, value in changes[steps[0]].items()}
 
 
 def calibrate(detector: Pipeline, capture: Capture, gate_m: float = 1.0) -> Calibration:
@@ -129,29 +134,14 @@ def calibrate(detector: Pipeline, capture: Capture, gate_m: float = 1.0) -> Cali
         range_bias_m=float(np.median(error_m[near, thing])),
         azimuth_bias_rad=float(np.median(azimuth_error)) if len(azimuth_error) >= MINIMUM_MATCHES else None,
         n=len(near),
-        subtracted=_subtracted(detector, capture.radar.channel),
+        stages=_stages(detector, capture.radar.channel),
     )
 
 
-def _subtracted(detector: Pipeline, channel: int | None) -> dict[str, Any]:
-    """Offsets that a detector's file asks for, by path."""
-    values: dict[str, Any] = {}
+def _stages(detector: Pipeline, channel: int | None) -> dict[str, Stage[Any]]:
+    """A detector's stages with its parameters for a channel, not opened."""
+    found = {}
     for step in detector.config.steps:
-        for name, default in _OFFSETS.get(step.use, {}).items():
-            values[f"pipeline.{step.label}.params.{name}"] = step.params_for(channel)[0].get(name, default)
-    return values
-
-
-def _path_of(stage: str, subtracted: Mapping[str, Any]) -> str:
-    offset = next(iter(_OFFSETS[stage]))
-    paths = [path.removesuffix(f".{offset}") for path in subtracted if path.endswith(f".{offset}")]
-    if len(paths) != 1:
-        raise ConfigError(f"the detector has {len(paths)} steps '{stage}'; an offset can be set where there is one")
-    return paths[0]
-
-
-def _number(path: str, subtracted: Mapping[str, Any]) -> float:
-    value = subtracted[path]
-    if isinstance(value, str):
-        raise ConfigError(f"{path}: a measured offset can be added to a number, not to the preset '{value}'")
-    return float(value)
+        cls = registry.load_plugin("stages", step.use)
+        found[step.label] = cls(cls.params_type().model_validate(step.params_for(channel)[0]))
+    return found

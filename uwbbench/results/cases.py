@@ -2,8 +2,8 @@
 
 Conventions
 -----------
-* The detector that leads the dataset's first leaderboard decides: its capture of highest and of lowest F1, or of
-  recall where the truth is not exhaustive. Equal ones: the first by name.
+* The detector that leads the dataset's first leaderboard decides: its best and its worst capture by the metric that
+  ranks. Equal ones: the first by name.
 * A detection is *near* if it lies within the gate of a visible obstacle.
 * Long captures are thinned to what a picture can show; the counts are those of all frames and detections.
 """
@@ -21,9 +21,10 @@ from uwbbench.api.arrays import BoolArray, FloatArray, IntArray
 from uwbbench.api.capture import CaptureHeader
 from uwbbench.api.detections import Detections
 from uwbbench.measure.accuracy.judge import Scene
-from uwbbench.measure.accuracy.metrics.detection import F1, Recall
+from uwbbench.measure.accuracy.metrics.choice import MetricChoice
 from uwbbench.measure.accuracy.scoring import ScoringRules
 from uwbbench.measure.accuracy.stats import evaluate
+from uwbbench.results.ground_truth import Outline, TrueRange, outlines, true_ranges
 from uwbbench.results.results import Scored
 from uwbbench.run.folder.folder import RunFolder
 from uwbbench.run.folder.journal import Entry
@@ -76,11 +77,10 @@ class Case:
     header : CaptureHeader
     time_s : (shown,) array
         Time of the shown frames, since the first.
-    range_m : (shown, obstacles) array
-        True range of each obstacle; NaN where it is hidden or outside the sector that scores look at.
-    obstacles : tuple of str
+    ranges : list of TrueRange
+        Of each obstacle in the shown frames.
     path_m : (shown, 2) array
-    outlines_m : list of (name, structure, (vertices, 2) array)
+    outlines : list of Outline
     marks : list of Marks
     """
 
@@ -94,15 +94,18 @@ class Case:
     score: float
     header: CaptureHeader
     time_s: FloatArray
-    range_m: FloatArray
-    obstacles: tuple[str, ...]
+    ranges: list[TrueRange]
     path_m: FloatArray
-    outlines_m: list[tuple[str, bool, FloatArray]]
+    outlines: list[Outline]
     marks: list[Marks]
 
 
 def cases(
-    folder: RunFolder, entries: Sequence[Entry], scored: Sequence[Scored], leaders: dict[tuple[str, str], str]
+    folder: RunFolder,
+    entries: Sequence[Entry],
+    scored: Sequence[Scored],
+    leaders: dict[tuple[str, str], str],
+    metrics: MetricChoice,
 ) -> Iterator[Case]:
     """Best and worst capture of each dataset.
 
@@ -114,6 +117,8 @@ def cases(
     scored : sequence of Scored
     leaders : dict
         Leading detector of each dataset and source.
+    metrics : MetricChoice
+        Of the run.
     """
     rule = folder.rules[0]
     for (dataset, source), leader in list(leaders.items())[:MOST_DATASETS]:
@@ -123,8 +128,12 @@ def cases(
             if (one.dataset, one.source, one.detector) == (dataset, source, leader)
             and (one.scoring, one.table) == (rule.scoring, "filtering")
         ]
-        ranked = sorted(((*_score(one), one.capture) for one in chosen), key=lambda row: (-row[1], row[2]))
-        ranked = [row for row in ranked if not math.isnan(row[1])]
+        names = [metrics.ranking(exhaustive=one.outcome.exhaustive) for one in chosen]
+        rows = [
+            (name, evaluate(metrics[name], [one.outcome]), one.capture) for name, one in zip(names, chosen, strict=True)
+        ]
+        ranked = [row for row in rows if not math.isnan(row[1])]
+        ranked.sort(key=lambda row: (-metrics[row[0]].merit(row[1]), row[2]))
         if not ranked:
             continue
         picks: list[tuple[Literal["best", "worst", "only"], tuple[str, float, str]]]
@@ -136,52 +145,33 @@ def cases(
             yield _case(folder, of_capture, rule, score, about)
 
 
-def _score(one: Scored) -> tuple[str, float]:
-    name, metric = ("f1", F1) if one.outcome.exhaustive else ("recall", Recall)
-    return name, evaluate(metric, [one.outcome])
-
-
 def _case(folder: RunFolder, entries: Sequence[Entry], rule: ScoringRules, score: float, about: dict[str, Any]) -> Case:
     capture_id = entries[0].capture_id
     header = folder.header(capture_id)
     shown = _thinned(len(header))
     since_s = header.trajectory.timestamp_s - header.trajectory.timestamp_s[:1]
-    things = header.truth.objects if header.truth is not None else ()
-    columns = [column for column, thing in enumerate(things) if not thing.structure]
     marks = []
-    range_m = np.empty((len(shown), 0))
     for entry in entries:
         found = folder.detections(entry.unit)
         scene = Scene.of(found, header)
-        visible = scene.visible(rule.region)
-        range_m = np.where(visible, scene.sight.range_m, np.nan)[shown][:, columns]
-        marks.append(_marks(entry.detector, found, since_s, scene, visible, rule))
+        marks.append(_marks(entry.detector, found, since_s, scene, rule))
     return Case(
         **about,
         capture_id=capture_id,
         score=score,
         header=header,
         time_s=since_s[shown],
-        range_m=range_m,
-        obstacles=tuple(things[column].name for column in columns),
+        ranges=true_ranges(header, rule.region, shown),
         path_m=header.trajectory.position_m[shown, :2],
-        outlines_m=[(thing.name, thing.structure, _outline(thing.outline_m, shown)) for thing in things],
+        outlines=outlines(header, shown),
         marks=marks,
     )
 
 
-def _outline(outline_m: FloatArray, shown: IntArray) -> FloatArray:
-    """Corners (vertices, 2); of a moving object the way of its middle (shown, 2)."""
-    flat = outline_m[..., :2]
-    return flat[shown].mean(axis=1) if flat.ndim == 3 else flat
-
-
-def _marks(
-    detector: str, found: Detections, since_s: FloatArray, scene: Scene, visible: BoolArray, rule: ScoringRules
-) -> Marks:
+def _marks(detector: str, found: Detections, since_s: FloatArray, scene: Scene, rule: ScoringRules) -> Marks:
     rows = _thinned(len(found))
     error_m = np.abs(scene.errors_m(found, "filtering"))
-    near = np.any((error_m <= rule.gate_m) & visible[found.frame], axis=1)
+    near = np.any((error_m <= rule.gate_m) & scene.visible(rule.region)[found.frame], axis=1)
     none = np.full(len(rows), np.nan)
     return Marks(
         detector=detector,

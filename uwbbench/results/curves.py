@@ -8,7 +8,6 @@ Conventions
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -19,6 +18,8 @@ from uwbbench.api.metric import Outcome
 from uwbbench.measure.accuracy.metrics.error import MeanAbsoluteError, Percentile90, Percentile95
 
 MOST_POINTS = 120
+SPREAD, SMALLEST_M = 10.0, 1e-3
+"""Ratio of the 95th percentiles from which errors get a logarithmic axis, and the smallest error on that."""
 
 
 @dataclass(frozen=True)
@@ -42,13 +43,20 @@ class ErrorCurve:
     p95_m: float
 
 
-def error_curve(outcomes: Sequence[Outcome]) -> ErrorCurve | None:
-    """Curve of all errors together; None where there is none."""
+def error_curve(outcomes: Sequence[Outcome], most: int = MOST_POINTS) -> ErrorCurve | None:
+    """Curve of all errors together; None where there is none.
+
+    Parameters
+    ----------
+    outcomes : sequence of Outcome
+    most : int
+        Points at most.
+    """
     parts = [np.abs(MeanAbsoluteError.partial(outcome)) for outcome in outcomes]
     error_m = np.sort(np.concatenate(parts)) if parts else np.empty(0)
     if not len(error_m):
         return None
-    rank = np.unique(np.linspace(0, len(error_m) - 1, MOST_POINTS).astype(np.int64))
+    rank = np.unique(np.linspace(0, len(error_m) - 1, min(most, len(error_m))).astype(np.int64))
     return ErrorCurve(
         error_m=error_m[rank],
         share=(rank + 1) / len(error_m),
@@ -75,12 +83,15 @@ def tail_curve(times_us: FloatArray) -> tuple[FloatArray, FloatArray]:
     return slowest[rank - 1], rank / len(slowest)
 
 
-def axis_limit_m(curves: Sequence[ErrorCurve]) -> tuple[float, bool]:
-    """Where an axis of errors ends, and whether it must be logarithmic.
+def error_axis(curves: Sequence[ErrorCurve]) -> tuple[float, float, bool]:
+    """Where an axis of errors starts and ends, in metres, and whether it must be logarithmic.
 
     It shows every curve up to its 95th percentile; where these are more than ten times apart, a linear axis would
     squeeze the better curves against its zero.
     """
     ends = [float(np.quantile(curve.error_m, 0.95)) for curve in curves]
-    far, near = max(ends, default=1.0), max(min(ends, default=1.0), 1e-3)
-    return max(1.5 * far, 1e-3), far > 10 * near and math.isfinite(far)
+    far, near = max(ends, default=1.0), max(min(ends, default=1.0), SMALLEST_M)
+    end = max(1.5 * far, SMALLEST_M)
+    if far <= SPREAD * near:
+        return 0.0, end, False
+    return max(min(float(curve.error_m[0]) for curve in curves), SMALLEST_M), end, True

@@ -9,7 +9,11 @@ Conventions
 * Accuracy, detection against SNR and false alarms are taken in the *clear* span :data:`CLEAR_M`, away from the direct
   path and from the last taps.
 * Detectors that report every cell over a threshold, and not one detection an echo, are asked for false alarms only.
-* Frames are independent by construction, so proportions have exact binomial intervals.
+* Frames of these captures are independent: places, phases and noise are drawn anew for each. Shares of frames have
+  exact binomial intervals. Cells of one frame are not independent, since the noise is correlated over taps, cells share
+  training cells, and a detector may scale a frame by what it holds: rates a cell have intervals over frames
+  (:func:`~uwbbench.measure.accuracy.stats.clustered_proportion`). A detector that carries a background from frame to
+  frame ties frames together a little; no interval allows for that.
 """
 
 from __future__ import annotations
@@ -23,17 +27,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from uwbbench.api import registry
 from uwbbench.api.arrays import BoolArray, FloatArray, IntArray
 from uwbbench.api.capture import CaptureHeader
 from uwbbench.api.detections import Detections
 from uwbbench.api.geometry import SPEED_OF_LIGHT_M_S
-from uwbbench.measure.accuracy.stats import clopper_pearson
+from uwbbench.measure.accuracy.stats import clopper_pearson, clustered_proportion
 from uwbbench.run.folder.folder import RunFolder
 
 if TYPE_CHECKING:
     import pandas as pd
 
-DATASET = "limits"
 SYMBOL_S, ROLL_OFF = 2.0e-9, 0.5
 """Root-raised-cosine pulse of the dataset (IEEE 802.15.4 HRP reference)."""
 GATE_M = 0.20
@@ -125,7 +129,9 @@ class Trial:
 
     def proportion(self, hits: BoolArray, among: BoolArray) -> dict[str, Any]:
         """Share of the frames ``among`` that are ``hits``, with its interval."""
-        return _proportion(int(np.sum(hits & among)), int(np.sum(among)))
+        count, frames = int(np.sum(hits & among)), int(np.sum(among))
+        low, high = clopper_pearson(count, frames)
+        return {"share": count / frames if frames else math.nan, "low": low, "high": high, "n": frames}
 
 
 class Limits:
@@ -149,7 +155,8 @@ class Limits:
     def trials(self) -> list[Trial]:
         """Every detector on every test signal, in the order of the experiment."""
         used = self.folder.manifest["experiment"]["datasets"]
-        params = {one["label"]: one["params"] for one in used if one["use"] == DATASET}
+        signals = registry.default("dataset.limits")
+        params = {one["label"]: one["params"] for one in used if one["use"] == signals}
         entries = [
             e for e in self.folder.entries() if (e.kind, e.status) == ("accuracy", "done") and e.dataset in params
         ]
@@ -207,11 +214,15 @@ class Limits:
     def _false_alarms(self, trial: Trial) -> Iterator[dict[str, Any]]:
         radar = trial.header.radar
         cell_m = SPEED_OF_LIGHT_M_S * radar.sample_interval_s / 2
-        cells = round(len(trial.found.processed) * (CLEAR_M[1] - CLEAR_M[0]) / cell_m)
-        alarms = int(np.sum(_clear(trial.found.range_m)))
+        cells = int(np.sum(_clear(cell_m * np.arange(radar.taps, dtype=np.float64))))
+        frames = len(trial.found.processed)
+        row = np.searchsorted(trial.found.processed, trial.found.frame[_clear(trial.found.range_m)])
+        alarms = np.bincount(row, minlength=frames)
+        low, high = clustered_proportion(alarms, cells)
+        total, n = int(alarms.sum()), frames * cells
+        rate = {"share": total / n if n else math.nan, "low": low, "high": high, "n": n}
         requested, condition = self._requested(trial.detector, radar.channel)
-        facts = {"requested": requested, "condition": condition, "alarms": alarms}
-        yield {"detector": trial.detector, **_proportion(alarms, cells), **facts}
+        yield {"detector": trial.detector, **rate, "requested": requested, "condition": condition, "alarms": total}
 
     def _requested(self, detector: str, channel: int | None) -> tuple[float, str]:
         """False-alarm rate that a detector asks of its CFAR stage, and what for; NaN where it has none."""
@@ -229,11 +240,6 @@ class Limits:
         """All tables as plain rows; empty where the run has no test signals."""
         names = ("accuracy", "detection", "blind_zone", "resolution", "false_alarms")
         return {name: getattr(self, name).to_dict("records") for name in names} if self.trials else {}
-
-
-def _proportion(hits: int, trials: int) -> dict[str, Any]:
-    low, high = clopper_pearson(hits, trials)
-    return {"share": hits / trials if trials else math.nan, "low": low, "high": high, "n": trials}
 
 
 def _clear(range_m: FloatArray) -> BoolArray:

@@ -139,11 +139,10 @@ def points(
     if not series:
         return []
     names = list(series)
-    sign = -1.0 if metric.better == "higher" else 1.0
     logs = np.array([math.log(speeds[name].ratio) for name in names])
-    best = front(logs[None], np.array([[sign * estimates[name].value for name in names]]))[0]
+    best = front(logs[None], np.array([[-metric.merit(estimates[name].value) for name in names]]))[0]
     resamples, seed = settings["resamples"], settings["seed"]
-    errors = sign * paired_draws(metric, list(series.values()), resamples=resamples, seed=seed)
+    errors = -metric.merit(paired_draws(metric, list(series.values()), resamples=resamples, seed=seed))
     chance = np.full(len(names), math.nan)
     if len(errors):
         spread = np.array([speeds[name].spread for name in names])

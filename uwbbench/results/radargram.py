@@ -1,4 +1,4 @@
-"""The samples of a capture as a picture over time and range, where the capture is at hand.
+"""The samples of a capture over time and range, and as a picture where the capture is at hand.
 
 A run folder holds no samples. The capture is opened again by its dataset and name; its content must be what the run
 saw, by its hash. No detector runs: delays count from what the capture says of itself.
@@ -9,16 +9,17 @@ from __future__ import annotations
 import base64
 import struct
 import zlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from uwbbench.api.arrays import FloatArray
+from uwbbench.api.arrays import FloatArray, IntArray
 from uwbbench.api.block import Block
 from uwbbench.api.capture import Capture
 from uwbbench.api.errors import CaptureError, UwbbenchError
+from uwbbench.api.radar import Radar
 from uwbbench.config.source import CaptureRef
 from uwbbench.results.delay import delay_of_range, zero_tap
 
@@ -68,30 +69,52 @@ def picture(capture: Capture) -> tuple[str, float]:
     Time runs from left to right over all frames, range from the bottom up; 50 dB from black to white.
     """
     range_m = np.linspace(0.0, capture.radar.window_m, ROWS)
-    image = _amplitudes(capture, range_m)
-    reached = np.flatnonzero(np.isfinite(image).any(axis=0))
+    chosen = np.unique(np.linspace(0, len(capture) - 1, min(COLUMNS, len(capture))).astype(np.int64))
+    blocks = (Block(capture.frames(frame, frame + 1)) for frame in chosen.tolist())
+    level_db, _ = levels(blocks, capture.radar, range_m, chosen, FLOOR_DB)
+    reached = np.flatnonzero(np.isfinite(level_db).any(axis=0))
     top = int(reached[-1]) + 1 if len(reached) else ROWS  # the taps end before the window where delays start late
-    image, far_m = image[:, :top], float(range_m[top - 1])
-    strongest = float(np.max(image, initial=0.0, where=np.isfinite(image))) or 1.0
-    with np.errstate(divide="ignore"):
-        image_db = 20 * np.log10(np.nan_to_num(image) / strongest)
-    grey = np.round(255 * np.clip(image_db / FLOOR_DB, 0.0, 1.0)).astype(np.uint8)
+    level_db, far_m = level_db[:, :top], float(range_m[top - 1])
+    grey = np.round(255 * np.nan_to_num(level_db, nan=FLOOR_DB) / FLOOR_DB).astype(np.uint8)
     return "data:image/png;base64," + base64.b64encode(_png(grey.T[::-1])).decode(), far_m
 
 
-def _amplitudes(capture: Capture, range_m: FloatArray) -> FloatArray:
-    """Amplitude (columns, ranges) of frames at equal distances."""
-    radar = capture.radar
+def levels(
+    blocks: Iterable[Block], radar: Radar, range_m: FloatArray, chosen: IntArray, floor_db: float
+) -> tuple[FloatArray, str]:
+    """Amplitude over frames and ranges, each frame shifted to where its delays count from.
+
+    Parameters
+    ----------
+    blocks : iterable of Block
+        Blocks that hold the chosen frames.
+    radar : Radar
+    range_m : (ranges,) array
+        Ranges on boresight.
+    chosen : (columns,) int array
+        Frames, increasing.
+    floor_db : float
+        Nothing is lower.
+
+    Returns
+    -------
+    level_db : (columns, ranges) array
+        Below the strongest of all; NaN in invalid frames, and where the taps do not reach.
+    origin : str
+        What delays count from.
+    """
     offset = delay_of_range(radar, range_m) / radar.sample_interval_s
-    chosen = np.unique(np.linspace(0, len(capture) - 1, min(COLUMNS, len(capture))).astype(np.int64))
     columns = []
-    for index in chosen:
-        block = Block(capture.frames(int(index), int(index) + 1))
-        zero, _ = zero_tap(block, radar)
-        amplitude = block.frames.amplitude[0]
-        shown = np.interp(offset + zero[0], np.arange(radar.taps), amplitude, left=np.nan, right=np.nan)
-        columns.append(shown if block.frames.valid[0] else np.full(len(range_m), np.nan))
-    return np.array(columns)
+    origin = ""
+    for block in blocks:
+        zero, origin = zero_tap(block, radar)
+        for row in np.flatnonzero(np.isin(block.frames.index, chosen)):
+            amplitude = block.frames.amplitude[row] if block.frames.valid[row] else np.full(radar.taps, np.nan)
+            columns.append(np.interp(offset + zero[row], np.arange(radar.taps), amplitude, left=np.nan, right=np.nan))
+    image = np.array(columns)
+    strongest = float(np.max(image, initial=0.0, where=np.isfinite(image))) or 1.0
+    with np.errstate(divide="ignore"):
+        return np.maximum(20 * np.log10(image / strongest), floor_db), origin
 
 
 def _png(grey: np.ndarray[Any, np.dtype[np.uint8]]) -> bytes:

@@ -14,7 +14,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections import defaultdict
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import cached_property
 from pathlib import Path
@@ -22,21 +22,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from uwbbench.api import registry
 from uwbbench.api.errors import StoreError
-from uwbbench.measure.accuracy.stats import Estimate, bootstrap
+from uwbbench.measure.accuracy.metrics.choice import MetricChoice
+from uwbbench.measure.accuracy.stats import Estimate
 from uwbbench.results import published
 from uwbbench.results.limits import Limits
-from uwbbench.results.results import Scored, scored
-from uwbbench.results.slices import estimates_of
+from uwbbench.results.results import Scored, errors_in, estimates_of, scored
 from uwbbench.run.folder.folder import RunFolder
 from uwbbench.run.folder.journal import Entry
 
 if TYPE_CHECKING:
     import pandas as pd
-
-STANDARD = ("precision", "recall", "f1", "mae", "p90", "p95", "sd", "false_alarms_per_minute")
-"""Metrics of every leaderboard, by registered name."""
 
 
 @contextmanager
@@ -81,8 +77,7 @@ class Report:
         self.experiment: dict[str, Any] = folder.manifest["experiment"]
         self.entries: list[Entry] = folder.entries()
         self.detectors: list[str] = [config["name"] for config in self.experiment["detectors"]]
-        names = dict.fromkeys([*STANDARD, *self.experiment["metrics"]])
-        self.metrics = {name: registry.load_plugin("metrics", name) for name in names}
+        self.metrics = MetricChoice(self.experiment["metrics"])
 
     @cached_property
     def scored(self) -> list[Scored]:
@@ -96,10 +91,7 @@ class Report:
         for one in self.scored:
             groups[one.dataset, one.source, one.scoring, one.table, one.detector].append(one)
         settings = {**self.experiment["intervals"], "seed": self.experiment["seed"]}
-        rows = []
-        for members in groups.values():
-            found = estimates_of(self.metrics, [one.outcome for one in members], settings)
-            rows.append((self._about(members), found))
+        rows = [(self._about(members), estimates_of(self.metrics, members, settings)) for members in groups.values()]
         rows.sort(key=lambda row: self._rank(*row))
         return rows
 
@@ -114,6 +106,7 @@ class Report:
             "invalid": sum(one.frames - one.processed for one in members),
             "unprocessed": sum(int(one.numbers["unprocessed"]) for one in members),
             "scored_frames": sum(len(one.outcome.group) for one in members),
+            "errors": errors_in(one.outcome for one in members),
             "exhaustive": all(one.outcome.exhaustive for one in members),
             "chance_recall": float((chance * truths).sum() / truths.sum()) if truths.sum() else math.nan,
             **self._times(first.detector, first.dataset),
@@ -127,11 +120,12 @@ class Report:
     def _of_kind(self, kind: str) -> list[Entry]:
         return [entry for entry in self.entries if entry.kind == kind and entry.status == "done"]
 
-    def _rank(self, about: dict[str, Any], found: dict[str, Estimate]) -> tuple[Any, ...]:
-        """Best F1 first; best recall where F1 is undefined. Undefined ones last, in the order of the experiment."""
-        best = found["f1" if about["exhaustive"] else "recall"].value
+    def _rank(self, about: dict[str, Any], estimates: dict[str, Estimate]) -> tuple[Any, ...]:
+        """Best first, by the metric that ranks. Undefined ones last, in the order of the experiment."""
+        name = self.metrics.ranking(exhaustive=about["exhaustive"])
+        merit = self.metrics[name].merit(estimates[name].value)
         table = (about["dataset"], about["source"], about["scoring"], about["table"])
-        return *table, math.inf if math.isnan(best) else -best, self.detectors.index(about["detector"])
+        return *table, math.inf if math.isnan(merit) else -merit, self.detectors.index(about["detector"])
 
     @cached_property
     def leaderboard(self) -> pd.DataFrame:
@@ -139,13 +133,9 @@ class Report:
         import pandas as pd
 
         rows = []
-        for about, found in self.estimates:
-            row = dict(about)
-            for name, estimate in found.items():
-                row |= {name: estimate.value, f"{name}_low": estimate.low, f"{name}_high": estimate.high}
-                row[f"{name}_n"] = estimate.n
-            row["groups"] = found["recall"].groups
-            rows.append(row)
+        for about, estimates in self.estimates:
+            groups = {estimate.groups for estimate in estimates.values()}
+            rows.append(about | _columns(estimates) | {"groups": max(groups)})
         return pd.DataFrame(rows)
 
     @cached_property
@@ -165,14 +155,10 @@ class Report:
         for _, members in sorted(groups.items(), key=lambda item: item[0]):
             first = members[0]
             keys = ("table", "scoring", "detector", "dataset", "channel", "material", "source")
-            outcomes = [one.outcome for one in members]
             row = {key: getattr(first, key) for key in keys} | {"captures": len(members)}
-            row["frames"] = sum(len(outcome.group) for outcome in outcomes)
-            for name in STANDARD[:7]:
-                estimate = bootstrap(self.metrics[name], outcomes, **settings)
-                row |= {name: estimate.value, f"{name}_low": estimate.low, f"{name}_high": estimate.high}
-                row[f"{name}_n"] = estimate.n
-            rows.append(row)
+            row["frames"] = sum(len(one.outcome.group) for one in members)
+            row["errors"] = errors_in(one.outcome for one in members)
+            rows.append(row | _columns(estimates_of(self.metrics, members, settings)))
         return pd.DataFrame(rows)
 
     @cached_property
@@ -191,9 +177,9 @@ class Report:
         for entry in self._of_kind("accuracy"):
             for step, count in entry.facts["chain"].items():
                 counts[entry.detector, entry.dataset, step] += count
-            clustered = self.folder.detections(entry.unit)["cluster"] >= 0
-            if "dbscan" in entry.facts["chain"]:
-                counts[entry.detector, entry.dataset, "in clusters"] += int(clustered.sum())
+            found = self.folder.detections(entry.unit)
+            if "cluster" in found:
+                counts[entry.detector, entry.dataset, "in clusters"] += int((found["cluster"] >= 0).sum())
         rows = [(*key, count) for key, count in counts.items()]
         datasets = [used["label"] for used in self.experiment["datasets"]]
         rows.sort(key=lambda row: (self.detectors.index(row[0]), datasets.index(row[1])))
@@ -266,13 +252,13 @@ class Report:
             for note in entry.facts["notes"]:
                 counts[f"{entry.detector}: {note}"] += 1
         said = [f"{note} ({count} captures)" if count > 1 else note for note, count in counts.items()]
-        return said + self.folder.damage
+        return said + list(self.metrics.notes) + self.folder.damage
 
     def to_dict(self) -> dict[str, Any]:
         """Everything as plain values, for JSON; undefined numbers are NaN, which the store writes as null."""
         rows = []
-        for about, found in self.estimates:
-            rows.append(about | {name: dataclasses.asdict(estimate) for name, estimate in found.items()})
+        for about, estimates in self.estimates:
+            rows.append(about | {name: dataclasses.asdict(estimate) for name, estimate in estimates.items()})
         keys = ("kind", "detector", "dataset", "capture", "reason")
         return {
             "run": str(self.folder.path),
@@ -288,6 +274,14 @@ class Report:
             "unscored": [{**facts_of(entry), "scoring": s, "reason": reason} for entry, s, reason in self.unscored],
             "notes": self.notes,
         }
+
+
+def _columns(estimates: Mapping[str, Estimate]) -> dict[str, float]:
+    """Values, ends of the intervals and counts of samples, as columns of a table."""
+    columns: dict[str, float] = {}
+    for name, one in estimates.items():
+        columns |= {name: one.value, f"{name}_low": one.low, f"{name}_high": one.high, f"{name}_n": one.n}
+    return columns
 
 
 def facts_of(entry: Entry) -> dict[str, str]:

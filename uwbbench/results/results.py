@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,8 +14,11 @@ from uwbbench.api.capture import CaptureHeader
 from uwbbench.api.errors import ScoringError, StoreError
 from uwbbench.api.metric import Outcome
 from uwbbench.measure.accuracy.judge import Scene, judge
+from uwbbench.measure.accuracy.metrics.choice import MetricChoice
 from uwbbench.measure.accuracy.scoring import ScoringRules, tables_of
+from uwbbench.measure.accuracy.stats import Estimate, bootstrap
 from uwbbench.run.folder.folder import RunFolder
+from uwbbench.run.folder.scored import column_of
 
 
 @dataclass(frozen=True)
@@ -111,3 +115,30 @@ def _nearest_m(scene: Scene, rule: ScoringRules) -> FloatArray:
     range_m = np.where(scene.visible(rule.region), scene.sight.range_m, np.inf)
     nearest_m = range_m.min(axis=1, initial=np.inf)[scene.scored]
     return np.where(np.isinf(nearest_m), np.nan, nearest_m)
+
+
+def estimates_of(metrics: MetricChoice, members: Sequence[Scored], settings: Mapping[str, Any]) -> dict[str, Estimate]:
+    """Estimate of each metric over some captures together.
+
+    Parameters
+    ----------
+    metrics : MetricChoice
+        One that is not installed is the mean of the values that were stored for each capture, without an interval.
+    members : sequence of Scored
+        What one detector did on each capture.
+    settings : mapping
+        ``resamples``, ``confidence`` and ``seed`` of the intervals.
+    """
+    outcomes = [one.outcome for one in members]
+    estimates = {name: bootstrap(metric, outcomes, **settings) for name, metric in metrics.items()}
+    for name in metrics.absent:
+        stored = [one.numbers.get(column_of(name, unit)) for one in members for unit in ("", "m")]
+        known = [value for value in stored if isinstance(value, float) and not math.isnan(value)]
+        if known:
+            estimates[name] = Estimate(float(np.mean(known)), math.nan, math.nan, len(known), estimates[name].groups)
+    return estimates
+
+
+def errors_in(outcomes: Iterable[Outcome]) -> int:
+    """Detections that have an error: those that belong to an object."""
+    return sum(int(np.isfinite(outcome.error_m).sum()) for outcome in outcomes)

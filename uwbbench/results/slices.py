@@ -21,9 +21,8 @@ import numpy as np
 
 from uwbbench.api.arrays import FloatArray
 from uwbbench.api.metric import Metric, Outcome
-from uwbbench.measure.accuracy.metrics.error import MeanAbsoluteError, matched_only
 from uwbbench.measure.accuracy.stats import Estimate, bootstrap, subset
-from uwbbench.results.results import Scored
+from uwbbench.results.results import Scored, errors_in
 
 WIDTHS_M = (0.25, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
 MOST_BINS = 8
@@ -48,6 +47,8 @@ class Slice:
     detector : str
     captures, frames : int
         Captures that have scored frames in this cut, and those frames.
+    hits, errors : int
+        True positives, and detections that have an error.
     estimates : mapping of str to Estimate
     """
 
@@ -58,6 +59,8 @@ class Slice:
     detector: str
     captures: int
     frames: int
+    hits: int
+    errors: int
     estimates: Mapping[str, Estimate]
 
 
@@ -99,7 +102,7 @@ def slices(
     ----------
     scored : sequence of Scored
     metrics : mapping of str to type of Metric
-        By name; ``matched_mae``, the mean absolute error of true positives, is added.
+        By name.
     edges_m : (bins + 1,) array
     settings : mapping
         ``resamples``, ``confidence`` and ``seed`` of the intervals.
@@ -124,18 +127,12 @@ def slices(
                 if (channel, material, span) == (ALL, ALL, ALL):
                     estimates = known[board, detector]
                 else:
-                    estimates = estimates_of(metrics, outcomes, {**settings, "resamples": 0} if threefold else settings)
+                    how = {**settings, "resamples": 0} if threefold else settings
+                    estimates = {name: bootstrap(metric, outcomes, **how) for name, metric in metrics.items()}
                 frames = sum(len(outcome.group) for outcome in outcomes)
-                yield Slice(board, channel, material, span, detector, len(outcomes), frames, estimates)
-
-
-def estimates_of(
-    metrics: Mapping[str, type[Metric]], outcomes: Sequence[Outcome], settings: Mapping[str, Any]
-) -> dict[str, Estimate]:
-    """Estimates of all metrics, and of the mean absolute error of true positives alone."""
-    found = {name: bootstrap(metric, outcomes, **settings) for name, metric in metrics.items()}
-    found["matched_mae"] = bootstrap(MeanAbsoluteError, [matched_only(one) for one in outcomes], **settings)
-    return found
+                hits = sum(int(outcome.tp.sum()) for outcome in outcomes)
+                counts = (len(outcomes), frames, hits, errors_in(outcomes))
+                yield Slice(board, channel, material, span, detector, *counts, estimates)
 
 
 def cuts(members: Sequence[Scored]) -> dict[tuple[str, str], tuple[tuple[str, str], list[Scored]]]:
@@ -149,7 +146,7 @@ def cuts(members: Sequence[Scored]) -> dict[tuple[str, str], tuple[tuple[str, st
     channels = sorted({channel_name(one.channel) for one in members})
     materials = sorted({one.material for one in members})
     widest: dict[frozenset[int], tuple[str, str]] = {}
-    found = {}
+    kept = {}
     for channel in [ALL, *channels]:
         for material in [ALL, *materials]:
             chosen = [
@@ -159,8 +156,8 @@ def cuts(members: Sequence[Scored]) -> dict[tuple[str, str], tuple[tuple[str, st
             ]
             if chosen:
                 same = widest.setdefault(frozenset(map(id, chosen)), (channel, material))
-                found[channel, material] = same, chosen
-    return found
+                kept[channel, material] = same, chosen
+    return kept
 
 
 def channel_name(channel: int | None) -> str:

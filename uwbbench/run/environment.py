@@ -30,6 +30,12 @@ def versions() -> dict[str, str]:
     return found
 
 
+def case_packages() -> list[str]:
+    """Names and versions of the packages, uwbbench apart, that bring hard cases of their stages."""
+    own = f"uwbbench {__version__}"
+    return sorted({entry.package for entry in registry.entries("cases").values()} - {own})
+
+
 def session(jobs: int) -> dict[str, Any]:
     """One call of the program that worked on a run."""
     return {
@@ -38,5 +44,6 @@ def session(jobs: int) -> dict[str, Any]:
         "jobs": jobs,
         "threads_per_job": 1,
         "versions": versions(),
+        "case_packages": case_packages(),
         "machine": machine(),
     }

@@ -27,15 +27,14 @@ from uwbbench.measure.latency.machine import machine, usable_cores
 from uwbbench.run import environment
 from uwbbench.run.experiment import Experiment
 from uwbbench.run.folder.folder import RunFolder
-from uwbbench.run.folder.identity import canonical, plain
+from uwbbench.run.folder.identity import accuracy_identity, canonical, latency_identity, plain, stability_name
 from uwbbench.run.folder.journal import Entry
-from uwbbench.run.folder.scored import table_of
+from uwbbench.run.folder.scored import rules_of, table_of, with_metrics
 from uwbbench.run.hard_cases import examined
 from uwbbench.run.hard_cases import failed as unexamined
-from uwbbench.run.hard_cases import identity_of as stability_identity
-from uwbbench.run.hard_cases import unit_of as stability_unit
-from uwbbench.run.plan import Plan, Unit, plan, reason_of, rules_of
-from uwbbench.run.unit import Finished, Job, content_of, entry_of, identity_of, run_unit
+from uwbbench.run.hard_cases import identity_of as identity_of_cases
+from uwbbench.run.plan import Plan, Unit, plan, reason_of
+from uwbbench.run.unit import Finished, Job, content_of, entry_of, run_unit
 
 
 class Interrupted(UwbbenchError):
@@ -186,7 +185,7 @@ class _Run:
     ) -> None:
         self.folder, self.experiment, self.plan = folder, experiment, todo
         self.workers, self.progress = workers, progress
-        self.rules = rules_of(experiment)
+        self.rules = rules_of(experiment.to_dict())
         self.session = uuid.uuid4().hex
         self.done = self.total = 0
 
@@ -231,11 +230,11 @@ class _Run:
     def _unexamined(self, before: dict[str, Entry]) -> list[DetectorConfig]:
         """Detectors whose stability is not known, or has changed with their sources."""
         known = {unit: entry.identity for unit, entry in before.items() if entry.status == "done"}
-        return [d for d in self._examinable if known.get(stability_unit(d)) != stability_identity(d)]
+        return [d for d in self._examinable if known.get(stability_name(d.name)) != identity_of_cases(d)]
 
     def _examine(self, detectors: list[DetectorConfig]) -> None:
         """Put the hard cases to detectors; one that takes its process down does not take the others' results."""
-        remaining = {stability_unit(detector): detector for detector in detectors}
+        remaining = {stability_name(detector.name): detector for detector in detectors}
         try:
             for entry in self._results(delayed(examined)(detector, os.getpid()) for detector in detectors):
                 del remaining[entry.unit]
@@ -265,20 +264,19 @@ class _Run:
         jobs = [delayed(content_of)(self._job(unit)) for unit in captures.values()]
         contents = dict(zip(captures, Parallel(n_jobs=self.workers)(jobs), strict=True)) if jobs else {}
         same = {
-            unit.id
-            for unit in maybe
-            if before[unit.id].identity == identity_of(unit, contents[unit.capture_id], self._basis(unit))
+            unit.id for unit in maybe if before[unit.id].identity == self._identity(unit, contents[unit.capture_id])
         }
         return [unit for unit in self.plan.units if unit.id not in same]
 
     def _job(self, unit: Unit) -> Job:
         return Job(unit, self.rules, self.session, os.getpid())
 
-    def _basis(self, unit: Unit) -> Any:
-        """What a result depends on besides detector and capture. Times also depend on the machine."""
+    def _identity(self, unit: Unit, sha256: str) -> str:
+        """Identity of a unit on a capture of this content, here and now."""
+        detector = Pipeline(unit.detector).identity
         if unit.kind == "latency":
-            return [self.experiment.latency.model_dump(), machine()]
-        return [dataclasses.asdict(rule) for rule in self.rules]
+            return latency_identity(detector, sha256, self.experiment.latency.model_dump(), machine())
+        return accuracy_identity(detector, sha256, self.rules)
 
     def _detect(self, units: list[Unit]) -> None:
         remaining = {unit.id: unit for unit in units}
@@ -325,7 +323,7 @@ class _Run:
         if latency.paced is not None:
             self.folder.write_times(f"{unit.id}-paced", latency.paced_times_us, latency.paced)
         facts = {**latency.to_dict(), "elapsed_s": time.perf_counter() - started}
-        identity = identity_of(unit, sha256, self._basis(unit))
+        identity = self._identity(unit, sha256)
         capture_id = unit.capture_id if sha256 else ""
         self._journal(entry_of(unit, "done", identity=identity, capture_id=capture_id, facts=facts))
 
@@ -337,4 +335,5 @@ class _Run:
     def _write_scores(self) -> None:
         entries = self.folder.entries()
         rows = {entry.unit: entry.scores for entry in entries if entry.status == "done"}
-        self.folder.write_scores(table_of(entries, rows), self.rules)
+        whole = with_metrics(self.folder, rows, self.rules, self.experiment.metrics)
+        self.folder.write_scores(table_of(entries, whole), self.rules)

@@ -9,20 +9,16 @@ from uwbbench import __version__
 from uwbbench.api.errors import UwbbenchError
 from uwbbench.config.detector import DetectorConfig
 from uwbbench.detect.pipeline import Pipeline
-from uwbbench.run.folder.identity import digest, file_id
+from uwbbench.run.environment import case_packages
+from uwbbench.run.folder.identity import stability_identity, stability_name
 from uwbbench.run.folder.journal import Entry
 from uwbbench.run.plan import reason_of
 from uwbbench.run.unit import die_with
 
 
-def unit_of(detector: DetectorConfig) -> str:
-    """Identifier of a detector's entry."""
-    return file_id(["stability", detector.name])
-
-
 def identity_of(detector: DetectorConfig) -> str:
-    """Hash of all that the result depends on: the detector with its sources, and the version of the cases."""
-    return digest(["stability", Pipeline(detector).identity, __version__])
+    """Hash of all that the result depends on: the detector with its sources, and the versions of the cases."""
+    return stability_identity(Pipeline(detector).identity, __version__, case_packages())
 
 
 def examined(detector: DetectorConfig, parent: int) -> Entry:
@@ -48,7 +44,7 @@ def examined(detector: DetectorConfig, parent: int) -> Entry:
 def failed(detector: DetectorConfig, reason: str = "", trace: str = "") -> Entry:
     """Entry of a detector that could not be examined."""
     return Entry(
-        unit=unit_of(detector),
+        unit=stability_name(detector.name),
         kind="stability",
         detector=detector.name,
         dataset="",

@@ -5,12 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+from uwbbench.api.text import one_line
 from uwbbench.config.detector import DetectorConfig
 from uwbbench.config.source import CaptureRef
-from uwbbench.measure.accuracy.scoring import Region, ScoringRules
 from uwbbench.run.experiment import Experiment
-from uwbbench.run.folder.identity import file_id
+from uwbbench.run.folder.identity import capture_name, listing_name, unit_name
 from uwbbench.run.folder.journal import Entry
+
+LONGEST_REASON = 400
 
 
 @dataclass(frozen=True)
@@ -34,12 +36,12 @@ class Unit:
     @property
     def id(self) -> str:
         """Name of the unit's files: the same in every run of the same experiment."""
-        return file_id([self.kind, self.detector.name, self.dataset, self.capture_id])
+        return unit_name(self.kind, self.detector.name, self.dataset, self.capture_id)
 
     @property
     def capture_id(self) -> str:
         """File name of the capture's header."""
-        return file_id([self.ref.dataset, self.ref.params, self.ref.name])
+        return capture_name(self.ref.dataset, self.ref.params, self.ref.name)
 
 
 @dataclass(frozen=True)
@@ -69,7 +71,7 @@ def plan(experiment: Experiment) -> Plan:
         except Exception as error:  # noqa: BLE001 - an adapter may raise anything; the other datasets still run
             failures.append(
                 Entry(
-                    unit=file_id(["listing", source.label]),
+                    unit=listing_name(source.label),
                     kind="listing",
                     detector="",
                     dataset=source.label,
@@ -85,15 +87,6 @@ def plan(experiment: Experiment) -> Plan:
     return Plan(tuple(accuracy + (latency if experiment.latency.enabled else [])), tuple(failures))
 
 
-def rules_of(experiment: Experiment) -> tuple[ScoringRules, ...]:
-    """Scoring rules of an experiment, one for each scoring."""
-    region = Region(experiment.region.min_range_m, experiment.region.max_range_m, experiment.region.half_angle_rad)
-    return tuple(
-        ScoringRules(scoring, experiment.gate_m, region, experiment.strongest) for scoring in experiment.scoring
-    )
-
-
 def reason_of(error: BaseException) -> str:
     """One line that says why something failed."""
-    text = " ".join(str(error).split()) or "no message"
-    return f"{type(error).__name__}: {text if len(text) <= 400 else text[:400] + '...'}"
+    return f"{type(error).__name__}: {one_line(error, LONGEST_REASON) or 'no message'}"

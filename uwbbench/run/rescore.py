@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from uwbbench.measure.accuracy.scoring import ScoringRules
 from uwbbench.run.folder.folder import RunFolder
-from uwbbench.run.folder.scored import score_rows, table_of
+from uwbbench.run.folder.scored import score_rows, table_of, with_metrics
 
 
 def rescore(folder: RunFolder, rules: Sequence[ScoringRules] | None = None) -> None:
@@ -20,6 +20,8 @@ def rescore(folder: RunFolder, rules: Sequence[ScoringRules] | None = None) -> N
 
     Raises
     ------
+    PluginError
+        If a metric that the experiment lists raises anything.
     StoreError
         If stored detections are missing or broken, or the scores cannot be written.
     """
@@ -30,4 +32,5 @@ def rescore(folder: RunFolder, rules: Sequence[ScoringRules] | None = None) -> N
         for entry in entries
         if entry.kind == "accuracy" and entry.status == "done"
     }
-    folder.write_scores(table_of(entries, rows), chosen)
+    whole = with_metrics(folder, rows, chosen, folder.manifest["experiment"]["metrics"])
+    folder.write_scores(table_of(entries, whole), chosen)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import os
 import signal
 import threading
@@ -17,7 +16,7 @@ from uwbbench.api.detections import Detections
 from uwbbench.config.source import CaptureRef
 from uwbbench.detect.pipeline import Pipeline
 from uwbbench.measure.accuracy.scoring import ScoringRules
-from uwbbench.run.folder.identity import digest
+from uwbbench.run.folder.identity import accuracy_identity
 from uwbbench.run.folder.journal import Entry, Status
 from uwbbench.run.folder.scored import score_rows
 from uwbbench.run.plan import Unit, reason_of
@@ -81,11 +80,6 @@ def content_of(job: Job) -> str:
         return ""
 
 
-def identity_of(unit: Unit, sha256: str, basis: Any) -> str:
-    """Hash of all that a unit's result depends on: detector with sources, capture content, and the ``basis``."""
-    return digest([unit.kind, Pipeline(unit.detector).identity, sha256, basis])
-
-
 def die_with(parent: int) -> None:
     """Make a worker leave the interrupt key to its parent, and end when the parent has ended, however it ended."""
     if os.getpid() == parent or threading.current_thread() is not threading.main_thread():
@@ -121,7 +115,8 @@ def _detected(job: Job) -> Finished:
     unit = job.unit
     capture = _opened(job.session, unit.ref)
     with_candidates = any(rule.scoring == "peak" for rule in job.rules)
-    found = Pipeline(unit.detector).run(capture)
+    pipeline = Pipeline(unit.detector)
+    found = pipeline.run(capture)
     candidates = found.candidates if with_candidates else None
     header = capture.header
     facts = {
@@ -139,7 +134,7 @@ def _detected(job: Job) -> Finished:
     entry = entry_of(
         unit,
         "done",
-        identity=identity_of(unit, capture.sha256, [dataclasses.asdict(rule) for rule in job.rules]),
+        identity=accuracy_identity(pipeline.identity, capture.sha256, job.rules),
         capture_id=unit.capture_id,
         scores=score_rows(found, header, job.rules),
         facts=facts,

@@ -150,7 +150,7 @@ def write_into_run(report: Report, roots: Sequence[Path]) -> tuple[Path, str]:
     missing : str
         Why there is no page; empty where there is.
     """
-    from uwbbench.show.page import ReportToolsError
+    from uwbbench.show.extras import ReportToolsError
     from uwbbench.show.text import write_report
 
     path = write_report(report)

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from uwbbench.results.comparison import Comparison
     from uwbbench.run import Progress
     from uwbbench.run.experiment import Experiment
-    from uwbbench.tools.gate import Result
+    from uwbbench.tools.gate import GateResult
     from uwbbench.tools.tune import TuneOutcome
 
 __all__ = ["Leaderboard", "compare", "gate", "leaderboard", "open_dataset", "open_run", "plot", "run", "tune"]
@@ -97,7 +97,9 @@ def _check_reach(plan: Experiment, jobs: int | None) -> None:
     ConfigError
         If a class that was registered here would be needed in another process.
     """
-    used: list[tuple[registry.Kind, str]] = [("stages", step.use) for config in plan.detectors for step in config.steps]
+    used: list[tuple[registry.PluginKind, str]] = [
+        ("stages", step.use) for config in plan.detectors for step in config.steps
+    ]
     used += [("datasets", source.use) for source in plan.datasets] + [("metrics", name) for name in plan.metrics]
     for kind, name in used:
         if registry.entry(kind, name).package == registry.HERE_ALONE and (jobs != 1 or plan.latency.enabled):
@@ -193,7 +195,7 @@ def gate(
     changes: Mapping[str, Any] | None = None,
     data_dir: str | Path | None = None,
     progress: Callable[[str], None] | None = None,
-) -> Result:
+) -> GateResult:
     """Check a detector against limits, as the command ``gate`` does.
 
     Parameters
@@ -209,7 +211,7 @@ def gate(
 
     Returns
     -------
-    Result
+    GateResult
         ``verdict``, and each of the ``checks`` with value, interval and limit.
 
     Raises

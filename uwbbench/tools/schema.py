@@ -13,8 +13,9 @@ from pydantic.json_schema import models_json_schema
 
 from uwbbench.api import registry
 from uwbbench.api.errors import PluginError
+from uwbbench.config.datasets import DatasetUse
 from uwbbench.config.detector import BY_CHANNEL, DetectorModel, StepModel
-from uwbbench.run.experiment import DatasetUse, ExperimentModel
+from uwbbench.run.experiment import ExperimentModel
 from uwbbench.tools.gate.config import GateModel
 from uwbbench.tools.tune.config import TuneModel
 
@@ -56,8 +57,8 @@ def scene_schema() -> Schema:
     PluginError
         If the dataset that reads scenes cannot be loaded.
     """
-    simulated = registry.load_plugin("datasets", "simulated")
-    return _file_schema(simulated.scene_model, simulated.term_model, "terms", by_channel=False)
+    simulator = registry.load_plugin("datasets", registry.default("dataset.scenes"))
+    return _file_schema(simulator.scene_model, simulator.term_model, "terms", by_channel=False)
 
 
 def _file_schema(

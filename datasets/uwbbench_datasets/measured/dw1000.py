@@ -73,7 +73,7 @@ def read_log(path: Path) -> Log:
     """All receptions that the chip called good, with their accumulators.
 
     An accumulator after ``RX E`` belongs to a reception with an error: the chip gives no direct path for it, and it is
-    left out. Two good receptions 17.2 s apart or more would be put too close together in time, as the chip's clock
+    left out. Two good receptions 17.2 s apart or more would be placed too close together in time, as the chip's clock
     has started anew in between.
 
     Raises
@@ -82,7 +82,7 @@ def read_log(path: Path) -> Log:
         If an accumulator is incomplete, of another length than the first, or without its reception; names the line.
     """
     lines = content(path).decode("latin-1").replace("\r\n", "\n").split("\n")
-    channel = next((int(found[1]) for line in lines[:10] if (found := _CHANNEL.search(line))), None)
+    channel = next((int(match[1]) for line in lines[:10] if (match := _CHANNEL.search(line))), None)
     if channel not in CHANNELS:
         raise CaptureError(f"{path}: no DW1000 channel ('Chan N') in the first ten lines: not a DecaRanging log")
     taps = 0

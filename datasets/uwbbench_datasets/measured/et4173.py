@@ -53,12 +53,12 @@ def read_scans(path: Path) -> tuple[FloatArray, FloatArray, float]:
     from scipy.io import loadmat
 
     try:
-        found: dict[str, Any] = loadmat(path, squeeze_me=True, struct_as_record=False, variable_names=["scn"])
+        variables: dict[str, Any] = loadmat(path, squeeze_me=True, struct_as_record=False, variable_names=["scn"])
     except Exception as error:  # scipy's errors for broken files share no base class
         raise CaptureError(f"{path}: not a MATLAB file that can be read: {error}") from error
-    if "scn" not in found:
+    if "scn" not in variables:
         raise CaptureError(f"{path}: holds no variable 'scn'")
-    scans = np.atleast_1d(found["scn"]).ravel()
+    scans = np.atleast_1d(variables["scn"]).ravel()
     for number, scan in enumerate(scans):
         missing = [name for name in _FIELDS if not hasattr(scan, name)]
         if missing:
@@ -100,7 +100,7 @@ class Et4173Walk(Dataset[Et4173WalkParams]):
     NaN before the first corner and after the last. The person is 0.37 m wide: score with a gate of 0.20 m or wider.
     The truth is not exhaustive, and two-dimensional, as heights are unknown.
 
-    **Poses.** Node 101 stands at (-2, 2) m, node 102 at (2, 2) m. The axes of the published path do not tell where the
+    **Poses.** Node 101 stands at (-2, 2) m, node 102 at (2, 2) m. The axes of the published path do not show where the
     antennas look: each node's boresight is taken to be the path's centre, (0, 0).
 
     **Band.** The device is specified from 3.1 to 4.8 GHz. The mean spectrum of the moving part, smoothed over 100 MHz,

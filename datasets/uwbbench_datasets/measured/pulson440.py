@@ -167,7 +167,7 @@ class Pulson440Rail(Dataset[Pulson440RailParams]):
     **Band.** The device is specified from 3.1 to 4.8 GHz, and so is the radar's header. In this recording the mean
     spectrum, smoothed over 100 MHz, is above -10 dB from 3.07 to 4.59 GHz.
 
-    **Truth** is not exhaustive: the room is full of unlabelled things, so precision has no meaning here.
+    **Truth** is not exhaustive: the room is full of unlabelled objects, so precision has no meaning here.
     """
 
     card: ClassVar[Card] = Card(

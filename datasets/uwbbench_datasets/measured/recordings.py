@@ -17,7 +17,7 @@ def list_recordings(dataset: Dataset[Any], patterns: Iterable[str]) -> dict[str,
     dataset : Dataset
         Gives the folders to search.
     patterns : iterable of str
-        Paths or glob patterns below the dataset's folder. A plain path is not looked up: opening it tells whether it
+        Paths or glob patterns below the dataset's folder. A plain path is not looked up: opening it shows whether it
         is there. Of a glob pattern, the first folder with a match wins.
 
     Returns

@@ -42,14 +42,14 @@ class Simulated(Dataset[SimulatedParams]):
     @cached_property
     def _runs(self) -> dict[str, tuple[Scene, int]]:
         """Scene and run by ``scene/variant/run``."""
-        found: dict[str, tuple[Scene, int]] = {}
+        runs: dict[str, tuple[Scene, int]] = {}
         for name in self.params.scenes:
             for scene in read_scenes(self._file(name), self.params.set):
                 for run in range(1, (self.params.runs or scene.model.runs) + 1):
-                    if f"{scene.name}/{run}" in found:
+                    if f"{scene.name}/{run}" in runs:
                         raise ConfigError(f"two scenes are named '{scene.name}'; give one of them another name")
-                    found[f"{scene.name}/{run}"] = (scene, run)
-        return found
+                    runs[f"{scene.name}/{run}"] = (scene, run)
+        return runs
 
     def _file(self, name: str) -> Path:
         if name.endswith((".yaml", ".yml")):

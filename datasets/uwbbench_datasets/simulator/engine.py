@@ -76,7 +76,7 @@ class Simulation:
         """Plain values, for JSON."""
         return {
             "captures": [capture.name for capture in self.captures],
-            "receivers": {name: [one.to_dict() for one in found] for name, found in self.contributions.items()},
+            "receivers": {name: [one.to_dict() for one in of_terms] for name, of_terms in self.contributions.items()},
         }
 
 
@@ -100,9 +100,9 @@ def simulate(scene: Scene, run: int = 1, *, threads: int = 1) -> Simulation:
     objects = tuple(item.body() for item in scene.model.objects)
     captures, contributions = [], {}
     for receiver in scene.model.receivers:
-        capture, found = _one_receiver(scene, run, receiver, trajectory, objects, threads)
+        capture, of_terms = _one_receiver(scene, run, receiver, trajectory, objects, threads)
         captures.append(capture)
-        contributions[receiver] = found
+        contributions[receiver] = of_terms
     text = _described(scene, contributions)
     return Simulation(tuple(replace(capture, description=text) for capture in captures), contributions)
 
@@ -127,7 +127,7 @@ def _one_receiver(
         name="/".join([scene.name, str(run), *([receiver] if several else [])]),
         radar=view.radar,
         trajectory=trajectory,
-        truth=Truth(tuple(thing.obstacle for thing in objects)),
+        truth=Truth(tuple(body.obstacle for body in objects)),
         source="simulated",
         license="BSD-3-Clause",
         citation="Simulated by uwbbench.",
@@ -175,9 +175,9 @@ def _view(scene: Scene, radar: Radar, trajectory: Trajectory, objects: tuple[Sce
 
 
 def _described(scene: Scene, contributions: Mapping[str, Sequence[Contribution]]) -> str:
-    """What the captures' file says about how they were made."""
+    """Description for the captures' file: how they were made."""
     about = scene.model.description or scene.name
-    parts = [f"{receiver}: {described(found)}" for receiver, found in contributions.items()]
+    parts = [f"{receiver}: {described(of_terms)}" for receiver, of_terms in contributions.items()]
     return " | ".join([f"Simulated by uwbbench. {about}", *parts])
 
 
@@ -189,12 +189,12 @@ def _synthesised(parts: list[_Part], view: View, threads: int) -> Responses:
     def work(block: int) -> list[tuple[float, int]]:
         rows = slice(block * BLOCK, min((block + 1) * BLOCK, len(view)))
         responses, costs = _block(parts, view.part(rows.start, rows.stop), block)
-        found = (responses.preamble, responses.sts1, responses.sts2)
-        for target, values in zip(out, found, strict=False):
+        computed = (responses.preamble, responses.sts1, responses.sts2)
+        for target, values in zip(out, computed, strict=False):
             target[rows] = values
         return costs
 
-    np.empty(2**24, np.uint8)  # its release tells glibc to keep such blocks: page faults would cost half of the time
+    np.empty(2**24, np.uint8)  # its release makes glibc keep such blocks: page faults would cost half of the time
     blocks = range(-(-len(view) // BLOCK))
     with ThreadPoolExecutor(threads) as pool:
         for costs in pool.map(work, blocks) if threads > 1 else map(work, blocks):
@@ -229,6 +229,17 @@ def _block(parts: list[_Part], view: View, block: int) -> tuple[Responses, list[
 
 def add_paths(antennas: ComplexArray, paths: Paths, view: View, name: str = "paths") -> None:
     """Add the pulses of paths to the responses (1 or 2, frames, taps) of the antennas, in place.
+
+    Parameters
+    ----------
+    antennas : (1 or 2, frames, taps) complex array
+        Responses so far; the second antenna is that of the array. Written.
+    paths : Paths
+        Delays count from the crest of each frame's direct path.
+    view : View
+        The same frames; gives the crest's tap, the pulse, the sample interval and the phase between the antennas.
+    name : str
+        Name of the term that gives the paths, for messages.
 
     Raises
     ------

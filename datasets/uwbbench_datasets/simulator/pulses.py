@@ -1,4 +1,4 @@
-"""Pulse shapes, as they stand in a channel impulse response: real, of unit height."""
+"""Pulse shapes, as they appear in a channel impulse response: real, of unit height."""
 
 from __future__ import annotations
 

@@ -225,7 +225,7 @@ def read_scenes(path: Path, changes: Mapping[str, Any] | None = None) -> list[Sc
 
 
 def _short_names(paths: list[str]) -> dict[str, str]:
-    """Last part of each path, with as much in front as tells them apart."""
+    """Last part of each path, with as much in front as separates them."""
     names = {}
     for path in paths:
         parts = path.split(".")
@@ -243,12 +243,12 @@ def _text(values: list[Any], value: Any) -> str:
 
 
 def _terms(model: SceneModel, source: YamlFile) -> tuple[tuple[TermUse, type[Term[Any]], Params], ...]:
-    found = []
+    terms = []
     for index, item in enumerate(model.terms):
         try:
             term: type[Term[Any]] = load_plugin("terms", item.use)
         except PluginError as error:
             raise PluginError(f"{source.place(('terms', index, 'use'))}: {error}") from error
         params = checked(term.params_type(), item.params, source, ("terms", index, "params"))
-        found.append((item, term, params))
-    return tuple(found)
+        terms.append((item, term, params))
+    return tuple(terms)

@@ -106,11 +106,11 @@ class Face:
 def faces(body: SceneObject) -> tuple[Face, ...]:
     """Faces of a plate, wall (front and back) or box (all four sides)."""
     sides = 4 if body.shape == "box" else 2
-    found = []
+    upright = []
     for turn in np.arange(4)[:: 4 // sides]:
         heading = body.yaw_rad + turn * np.pi / 2
         normal = rotate_z(np.array([1.0, 0.0, 0.0]), heading)
         across = rotate_z(np.array([0.0, 1.0, 0.0]), heading)
         depth, width = (body.depth_m, body.width_m) if turn % 2 == 0 else (body.width_m, body.depth_m)
-        found.append(Face(body.center_m + depth / 2 * normal, normal, across, width, body.height_m))
-    return tuple(found)
+        upright.append(Face(body.center_m + depth / 2 * normal, normal, across, width, body.height_m))
+    return tuple(upright)

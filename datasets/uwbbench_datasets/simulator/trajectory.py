@@ -143,6 +143,15 @@ TrajectoryModel = Annotated[Static | Straight | Waypoints | Arc | StopAndGo | Fr
 def sampled(model: TrajectoryModel, rate_hz: float, folder: Path) -> Trajectory:
     """Pose at each frame of a run.
 
+    Parameters
+    ----------
+    model : TrajectoryModel
+        One of the ways that a scene can name.
+    rate_hz : float
+        Frames a second.
+    folder : Path
+        The scene's folder, which holds the file of a ``kind: file``.
+
     Raises
     ------
     CaptureError

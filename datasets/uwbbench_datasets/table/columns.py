@@ -124,15 +124,15 @@ def require_columns(recording: Recording, wanted: dict[str, str]) -> None:
 def _tap_columns(recording: Recording, pattern: str, key: str) -> list[str]:
     """Columns of a pattern in the order of their tap numbers."""
     number = re.compile(re.escape(pattern).replace(re.escape("{tap}"), r"(\d+)"))
-    found = {int(hit[1]): name for name in recording.names if (hit := number.fullmatch(name))}
-    if not found:
+    columns = {int(hit[1]): name for name in recording.names if (hit := number.fullmatch(name))}
+    if not columns:
         hint = nearest(pattern, _families(recording.names))
         raise CaptureError(f"{recording.path}: no columns like '{pattern}', which the mapping's {key} names.{hint}")
-    missing = sorted(set(range(min(found), max(found))) - set(found))
+    missing = sorted(set(range(min(columns), max(columns))) - set(columns))
     if missing:
         gap = pattern.replace("{tap}", str(missing[0]))
         raise CaptureError(f"{recording.path}: column '{gap}' is missing between others of '{pattern}'")
-    return [found[tap] for tap in sorted(found)]
+    return [columns[tap] for tap in sorted(columns)]
 
 
 def _families(names: Iterable[str]) -> list[str]:
@@ -146,18 +146,27 @@ def _families(names: Iterable[str]) -> list[str]:
 def labels_of(values: np.ndarray, path: Path, column: str) -> list[str]:
     """Values of a column as text, whole numbers without a decimal point.
 
+    Parameters
+    ----------
+    values : array
+        Cells of the column as stored: numbers, text or bytes, one for each row.
+    path : Path
+        File of the column, for messages.
+    column : str
+        Name of the column, for messages.
+
     Raises
     ------
     CaptureError
         If a row has no value.
     """
-    found = []
+    labels = []
     for row, value in enumerate(values.ravel().tolist()):
         if value is None or value != value or value == "":  # NaN
             raise CaptureError(f"{path}: column '{column}' is empty in row {row + 1}")
         text = value.decode() if isinstance(value, bytes) else value
-        found.append(str(int(text)) if isinstance(text, float) and text.is_integer() else str(text).strip())
-    return found
+        labels.append(str(int(text)) if isinstance(text, float) and text.is_integer() else str(text).strip())
+    return labels
 
 
 def _numbers(values: np.ndarray, label: str) -> np.ndarray:

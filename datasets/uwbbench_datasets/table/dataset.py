@@ -58,7 +58,7 @@ class Table(Dataset[TableParams]):
     """Recordings of one's own in tables, read through a mapping file.
 
     Each run, receiver and channel of a file is a capture, named ``file/run/receiver/ch9`` without the parts that no
-    column tells apart.
+    column separates.
     """
 
     card: ClassVar[Card] = Card(
@@ -84,11 +84,11 @@ class Table(Dataset[TableParams]):
         if not wanted:
             raise CaptureError(f"{self._mapping_path}: names no files, and neither do the dataset's parameters")
         folder = self._mapping_path.parent
-        found = find_files(wanted, [folder])
-        outside = [path for path in found if not path.is_relative_to(folder.resolve())]
+        paths = find_files(wanted, [folder])
+        outside = [path for path in paths if not path.is_relative_to(folder.resolve())]
         if outside:
             raise CaptureError(f"{self._mapping_path}: files: {outside[0]} lies outside the mapping's folder")
-        return short_names(found)
+        return short_names(paths)
 
     def names(self) -> list[str]:
         """One capture for each run, receiver and channel of each file.
@@ -100,13 +100,13 @@ class Table(Dataset[TableParams]):
         CaptureError
             If no file is found.
         """
-        found: list[str] = []
+        names: list[str] = []
         for stem, path in self._files.items():
             try:
-                found += self._parts(stem, path)
+                names += self._parts(stem, path)
             except CaptureError:
-                found.append(stem)  # opening it tells what is wrong
-        return found
+                names.append(stem)  # opening it raises the error
+        return names
 
     def open(self, name: str) -> Capture:
         """Read one capture.
@@ -146,7 +146,7 @@ class Table(Dataset[TableParams]):
         together: dict[tuple[str, ...], list[int]] = {}
         for row, key in enumerate(zip(*labels.values(), strict=True)):
             together.setdefault(key, []).append(row)
-        found: dict[str, _Part] = {}
+        parts: dict[str, _Part] = {}
         for key, rows in together.items():
             value = dict(zip(labels, key, strict=True))
             channel = mapping.radar.channel
@@ -155,8 +155,8 @@ class Table(Dataset[TableParams]):
                 value["channel_column"] = f"ch{channel}"
             name = "/".join((stem, *value.values()))
             run, receiver = value.get("run_column", path.stem), value.get("receiver_column")
-            found[name] = _Part(path, run, receiver, channel, np.array(rows))
-        return found
+            parts[name] = _Part(path, run, receiver, channel, np.array(rows))
+        return parts
 
     def _capture(self, name: str, part: _Part) -> Capture:
         mapping = self._mapping
@@ -206,7 +206,7 @@ class Table(Dataset[TableParams]):
         receiver = part.receiver or next(iter(mapping.receivers))
         if receiver not in mapping.receivers:
             hint = nearest(receiver, mapping.receivers)
-            raise CaptureError(f"{self._mapping_path}: receivers: nothing said of '{receiver}' in {part.path}.{hint}")
+            raise CaptureError(f"{self._mapping_path}: receivers: no entry for '{receiver}' in {part.path}.{hint}")
         mount = mapping.receivers[receiver]
         return Radar(
             model=mapping.radar.model,
@@ -234,16 +234,16 @@ class Table(Dataset[TableParams]):
             return None
         material = "unknown"
         if column is not None:
-            found = list(dict.fromkeys(labels_of(table.cells(column), part.path, column)))
-            if len(found) > 1:
-                several = ", ".join(found)
+            materials = list(dict.fromkeys(labels_of(table.cells(column), part.path, column)))
+            if len(materials) > 1:
+                several = ", ".join(materials)
                 raise CaptureError(
                     f"column '{column}' holds several materials in one capture ({several}); "
                     "name a run_column that separates them"
                 )
-            material = found[0] if found else material
-        present = [thing for thing in facts.objects if thing.runs is None or part.run in thing.runs]
-        return Truth(tuple(thing.obstacle(material) for thing in present), facts.exhaustive)
+            material = materials[0] if materials else material
+        present = [item for item in facts.objects if item.runs is None or part.run in item.runs]
+        return Truth(tuple(item.obstacle(material) for item in present), facts.exhaustive)
 
 
 def _channel(text: str, path: Path, column: str) -> int:
@@ -256,5 +256,5 @@ def _channel(text: str, path: Path, column: str) -> int:
 def _rate(timestamp_s: FloatArray) -> float:
     spacing = float(np.median(np.diff(timestamp_s))) if len(timestamp_s) > 1 else 0.0
     if not spacing > 0:
-        raise CaptureError("the timestamps do not tell a frame rate; give radar.frame_rate_hz in the mapping")
+        raise CaptureError("no frame rate follows from the timestamps; give radar.frame_rate_hz in the mapping")
     return 1 / spacing

@@ -50,7 +50,7 @@ class Recording:
 
 
 def open_recording(path: Path, delimiter: str = ",") -> Recording:
-    """Open a table; the suffix of its name tells the format.
+    """Open a table; the suffix of its name gives the format.
 
     Raises
     ------

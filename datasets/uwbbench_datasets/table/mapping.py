@@ -39,7 +39,7 @@ class RadarFacts(Params):
     """What is true of the radar, whichever receiver or channel a row is of."""
 
     model: str = Field(description="Device name, for people.")
-    channel: int | None = Field(None, description="IEEE 802.15.4 channel, where no column tells it.")
+    channel: int | None = Field(None, description="IEEE 802.15.4 channel, where no column gives it.")
     center_frequency_hz: float | dict[int, float] | None = Field(
         None, description="Carrier, or one for each channel; may be left out for channels 5 and 9."
     )
@@ -127,8 +127,8 @@ class SampleColumns(Params):
 
     def pattern(self, key: str) -> str | None:
         """Column name or pattern behind a key."""
-        found: str | None = getattr(self, "complex_" if key == "complex" else key)
-        return found
+        name: str | None = getattr(self, "complex_" if key == "complex" else key)
+        return name
 
 
 class TimeColumn(Params):
@@ -161,7 +161,7 @@ class ObjectFacts(Params):
     """One labelled object: an outline in the world, or a rectangle by centre, size and yaw."""
 
     id: str = Field(min_length=1)
-    material: str | None = Field(None, description="Left out where material_column tells it.")
+    material: str | None = Field(None, description="Left out where material_column gives it.")
     outline_m: list[tuple[float, ...]] | None = Field(None, description="Corners [x, y] or [x, y, z]; one is a point.")
     center_m: Point | None = None
     size_m: Point | None = Field(None, description="Extent along the object's own x and y.")
@@ -215,7 +215,7 @@ class TableMapping(Params):
     citation: str = ""
     description: str = ""
     radar: RadarFacts
-    receivers: dict[str, ReceiverFacts] = Field(min_length=1, description="By name; one name if no column tells it.")
+    receivers: dict[str, ReceiverFacts] = Field(min_length=1, description="By name; one name if no column gives it.")
     run_column: str | None = None
     receiver_column: str | None = None
     channel_column: str | None = None
@@ -241,7 +241,7 @@ class TableMapping(Params):
         if any(part is not None and part.layout == ("real",) for part in (self.sts1, self.sts2)):
             raise ValueError("sts1 and sts2 are complex; 'real' is for the preamble of an RF radar")
         if self.receiver_column is None and len(self.receivers) > 1:
-            raise ValueError("several receivers need a receiver_column that tells them apart")
+            raise ValueError("several receivers need a receiver_column that separates them")
         if self.time is None and self.radar.frame_rate_hz is None:
             raise ValueError("without a time column, radar.frame_rate_hz must be given")
         return self
@@ -267,7 +267,7 @@ def read_mapping(path: Path) -> TableMapping:
     whole = truth.model_copy(update={"objects": [*truth.objects, *listed]})
     if not whole.objects:
         raise ConfigError(f"{path}: truth: expected objects or an objects_file with rows")
-    nameless = [thing.id for thing in whole.objects if thing.material is None]
+    nameless = [item.id for item in whole.objects if item.material is None]
     if nameless and mapping.material_column is None:
         raise ConfigError(f"{path}: truth: no material for {', '.join(nameless)}; state it, or name a material_column")
     return mapping.model_copy(update={"truth": whole})

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import ClassVar, Literal, Self, TypeVar
 
 import numpy as np
@@ -138,6 +139,11 @@ class Cfar(Stage[P]):
         )
 
     @property
+    def resolves_taps(self) -> float:
+        """The guard taps for means of training cells, which a second echo raises; an order statistic passes it by."""
+        return self.params.guard_taps if self.statistic in ("ca", "go") else math.inf
+
+    @property
     def _rank(self) -> float:
         """Share of the training cells below an order statistic."""
         return 1.0
@@ -159,8 +165,10 @@ class Cfar(Stage[P]):
                 f"cfar.{self.statistic}: some taps with a signal have training taps that are all zero; without noise "
                 "there is no threshold, and nothing is detected in them"
             )
-        found = Detections(row + frames.first, processed=frames.index, tap=tap, amplitude=amplitude, score_db=score_db)
-        return block.replace(detections=found)
+        detections = Detections(
+            row + frames.first, processed=frames.index, tap=tap, amplitude=amplitude, score_db=score_db
+        )
+        return block.replace(detections=detections)
 
 
 class CellAveraging(Cfar[CfarParams]):

@@ -153,31 +153,40 @@ def estimate_by_rank(
         noise[cell] = np.inf
         if below[cell] < place:
             continue
-        found = 0
+        count = 0
         if cell >= edge:
-            found = _gather(power[cell - edge : cell - guard], factor[cell], power[cell], scratch, found)
+            count = _gather(power[cell - edge : cell - guard], factor[cell], power[cell], scratch, count)
         if cell < last:
-            found = _gather(power[cell + beyond : cell + beyond + half], factor[cell], power[cell], scratch, found)
+            count = _gather(power[cell + beyond : cell + beyond + half], factor[cell], power[cell], scratch, count)
         noise[cell] = scratch[place - 1]
 
 
 @compiled
-def _gather(training: FloatArray, factor: float, cell: float, into: FloatArray, found: int) -> int:
+def _gather(training: FloatArray, factor: float, cell: float, into: FloatArray, count: int) -> int:
     """Put the training cells that a cell exceeds by the factor among sorted ones; return how many there are now."""
     for power in training:
         if factor * power < cell:
-            place = found
+            place = count
             while place > 0 and into[place - 1] > power:
                 into[place] = into[place - 1]
                 place -= 1
             into[place] = power
-            found += 1
-    return found
+            count += 1
+    return count
 
 
 @compiled
 def is_crest(amplitude: FloatArray, tap: int, reach: int) -> bool:
-    """Whether no tap within ``reach`` exceeds this one; of equal ones the first is the crest."""
+    """Whether no tap within ``reach`` exceeds this one; of equal ones the first is the crest.
+
+    Parameters
+    ----------
+    amplitude : (taps,) array
+        Magnitudes of one frame.
+    tap : int
+    reach : int
+        Taps on either side that are compared, as far as the frame has them.
+    """
     height = amplitude[tap]
     for other in range(max(tap - reach, 0), min(tap + reach + 1, len(amplitude))):
         higher = height > amplitude[other] or (height == amplitude[other] and tap <= other)
@@ -257,7 +266,7 @@ def detect(
             score_db[count] = 10 * (math.log10(power[cell]) - math.log10(noise[cell]))
             count += 1
     rows, tested = rows[:count].copy(), tested[:count].copy()
-    found = np.empty(count)
+    magnitude = np.empty(count)
     for place in range(count):
-        found[place] = amplitude[rows[place], tested[place]]
-    return rows, tested, found, score_db[:count].copy(), silent
+        magnitude[place] = amplitude[rows[place], tested[place]]
+    return rows, tested, magnitude, score_db[:count].copy(), silent

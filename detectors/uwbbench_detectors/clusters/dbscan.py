@@ -55,8 +55,6 @@ class DbscanParams(Params):
 class Dbscan(Stage[DbscanParams]):
     """DBSCAN over the world positions of all detections so far, again after every few new points.
 
-    ``clusterings`` counts how often that happened, so that a benchmark can tell those calls from the others.
-
     A detection is held back until a re-clustering puts it into a cluster, and handed out with that cluster's number;
     over all points so far, membership is never lost, so that waiting is all it takes. What is still noise at the end,
     or when it leaves the ``window``, is handed out with -1, and so is at once a detection without position, which
@@ -85,32 +83,32 @@ class Dbscan(Stage[DbscanParams]):
         self._origin_m: FloatArray | None = None  # the first point, once there is one
         self._rounds = self._start()
         self._frames: Frames | None = None
-        self._nothing: Detections | None = None
-        self.clusterings = 0
+        self._no_detections: Detections | None = None
+        self.clusterings: int = 0
 
     def step(self, block: Block) -> Block:
         """Block with the detections that are ready, their ``cluster`` filled in."""
-        found = block.detections
+        detections = block.detections
         self._frames = block.frames
         if self.params.labels == "final":
-            self._held.add(found)
-            return block.replace(detections=self._none_of(found))
-        located = np.isfinite(found["x_m"]) & np.isfinite(found["y_m"])
+            self._held.add(detections)
+            return block.replace(detections=self._none_of(detections))
+        located = np.isfinite(detections["x_m"]) & np.isfinite(detections["y_m"])
         count = int(np.count_nonzero(located))
-        all_located = count == len(found)
+        all_located = count == len(detections)
         before = self._new
-        self._held.add(found if all_located else found.take(located))
+        self._held.add(detections if all_located else detections.take(located))
         self._new += count
         due = self._new - self._new % self.params.every
         if all_located and not due:
-            return block.replace(detections=self._none_of(found))
+            return block.replace(detections=self._none_of(detections))
         columns, rounds = self._recluster(due)
-        ready = Detections(**columns, processed=found.processed, notes=found.notes)
+        ready = Detections(**columns, processed=detections.processed, notes=detections.notes)
         if not all_located:
             # They come out at once: before what is released by the round that they arrived in.
             lost_in = ((before + np.cumsum(located)) // self.params.every)[~located]
             order = np.argsort(np.concatenate([lost_in, rounds]), kind="stable")
-            ready = Detections.join([_with_cluster(found.take(~located), NOISE), ready]).take(order)
+            ready = Detections.join([_with_cluster(detections.take(~located), NOISE), ready]).take(order)
         return block.replace(detections=ready)
 
     def flush(self) -> Block | None:
@@ -133,19 +131,19 @@ class Dbscan(Stage[DbscanParams]):
             return GrowingRounds(params.eps_m, params.min_samples, params.every)
         return WindowedRounds(params.eps_m, params.min_samples, params.every, params.window)
 
-    def _none_of(self, found: Detections) -> Detections:
+    def _none_of(self, detections: Detections) -> Detections:
         """Detections without rows, prepared once: most calls release nothing."""
-        if self._nothing is None or self._nothing.names != (*found.names, "cluster"):
-            self._nothing = _with_cluster(found.take(np.empty(0, np.int64)), NOISE).annotated(
+        if self._no_detections is None or self._no_detections.names != (*detections.names, "cluster"):
+            self._no_detections = _with_cluster(detections.take(np.empty(0, np.int64)), NOISE).annotated(
                 processed=np.empty(0, np.int64)
             )
-        return self._nothing
+        return self._no_detections
 
     def _recluster(self, count: int) -> tuple[dict[str, Any], IntArray]:
         """Cluster the first of the new points; columns of what that decides, and the round that did."""
         if not count:
-            nothing = np.empty(0, np.int64)
-            return {**self._held.release(nothing), "cluster": nothing}, nothing
+            empty = np.empty(0, np.int64)
+            return {**self._held.release(empty), "cluster": empty}, empty
         points_m = self._held.points_m(self._new)[:count]
         if self._origin_m is None:
             self._origin_m = points_m[0]
@@ -167,5 +165,5 @@ class Dbscan(Stage[DbscanParams]):
         return clusters
 
 
-def _with_cluster(found: Detections, number: int) -> Detections:
-    return found.with_columns(cluster=np.full(len(found), number))
+def _with_cluster(detections: Detections, number: int) -> Detections:
+    return detections.with_columns(cluster=np.full(len(detections), number))

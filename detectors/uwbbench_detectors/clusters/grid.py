@@ -180,7 +180,15 @@ def _fill_table(table: Any, cells: Any, count: int) -> None:
 
 @compiled
 def cell_at(grid: Grid, column: int, row: int) -> int:
-    """Cell with these indices, made if there is none yet."""
+    """Cell with these indices, made if there is none yet.
+
+    Parameters
+    ----------
+    grid : Grid
+        With room for one cell more.
+    column, row : int
+        Coordinates of the points divided by the cell's side, rounded down: x, y.
+    """
     slot = _slot_of(grid.table, grid.cells, column, row)
     if grid.table[slot] >= 0:
         return int(grid.table[slot])
@@ -220,7 +228,14 @@ def root_of(parent: NDArray[np.int32], cell: int) -> int:
 
 @compiled
 def joined(grid: Grid, left: int, right: int) -> int:
-    """Root of two components made one: that of the one with the first core point."""
+    """Root of two components made one: that of the one with the first core point.
+
+    Parameters
+    ----------
+    grid : Grid
+    left, right : int
+        Roots of two different components, in any order.
+    """
     cells = grid.cells
     if cells[right].first < cells[left].first:
         left, right = right, left
@@ -231,14 +246,32 @@ def joined(grid: Grid, left: int, right: int) -> int:
 
 @compiled
 def neighbours(point: Any, x: float, y: float, radius: Radius) -> bool:
-    """Whether a point is a neighbour of another one."""
+    """Whether a point is a neighbour of another one.
+
+    Parameters
+    ----------
+    point : record
+        One of ``POINT``.
+    x, y : float
+        Coordinates of the other point.
+    radius : Radius
+    """
     dx, dy = point.x - x, point.y - y
     return bool(dx * dx + dy * dy <= radius.squared)
 
 
 @compiled
 def bounds_reach(cell: Any, x: float, y: float, radius: Radius) -> bool:
-    """Whether a neighbour of a point may lie within the bounds of a cell's core points; False is certain."""
+    """Whether a neighbour of a point may lie within the bounds of a cell's core points; False is certain.
+
+    Parameters
+    ----------
+    cell : record
+        One of ``CELL``.
+    x, y : float
+        Coordinates of the point.
+    radius : Radius
+    """
     over_x = max(cell.low_x - x, x - cell.high_x, 0.0)
     over_y = max(cell.low_y - y, y - cell.high_y, 0.0)
     if over_x * over_x + over_y * over_y > radius.squared:
@@ -250,7 +283,15 @@ def bounds_reach(cell: Any, x: float, y: float, radius: Radius) -> bool:
 
 @compiled
 def widen_bounds(cell: Any, x: float, y: float) -> None:
-    """Take a core point into the bounds of its cell."""
+    """Take a core point into the bounds of its cell.
+
+    Parameters
+    ----------
+    cell : record
+        One of ``CELL``; written.
+    x, y : float
+        Coordinates of the core point.
+    """
     cell.low_x = min(cell.low_x, x)
     cell.high_x = max(cell.high_x, x)
     cell.low_y = min(cell.low_y, y)

@@ -24,14 +24,14 @@ class HeldRows:
         self._released = np.empty(0, np.bool_)
         self._used = 0
 
-    def add(self, found: Detections) -> None:
+    def add(self, arrived: Detections) -> None:
         """Take in rows; a column that only some of them have is NaN in the others."""
-        if found.names != self._names:
-            found = self._completed(found)
-        if self._used + len(found) > len(self._places):
-            self._make_room(len(found))
-        start, stop = self._used, self._used + len(found)
-        self._rows[start:stop] = found.table
+        if arrived.names != self._names:
+            arrived = self._completed(arrived)
+        if self._used + len(arrived) > len(self._places):
+            self._make_room(len(arrived))
+        start, stop = self._used, self._used + len(arrived)
+        self._rows[start:stop] = arrived.table
         self._used = stop
 
     def points_m(self, count: int) -> FloatArray:
@@ -50,13 +50,13 @@ class HeldRows:
         """Return columns of all rows that are held, in their order of arrival, and hold none."""
         return self.release(self._places[: self._used][~self._released[: self._used]])
 
-    def _completed(self, found: Detections) -> Detections:
+    def _completed(self, arrived: Detections) -> Detections:
         """Rows with all columns that others have, in their order; columns that are new get a place in the table."""
-        new = [name for name in found.names if name not in (*self._names, "cluster")]
+        new = [name for name in arrived.names if name not in (*self._names, "cluster")]
         self._names = (*self._names, *new)
         self._rows = np.concatenate([self._rows, np.full((len(self._rows), len(new)), np.nan)], axis=1)
-        columns: dict[str, Any] = {name: found[name] for name in self._names[1:]}
-        return Detections(found.frame, processed=(), **columns)
+        columns: dict[str, Any] = {name: arrived[name] for name in self._names[1:]}
+        return Detections(arrived.frame, processed=(), **columns)
 
     def _make_room(self, count: int) -> None:
         """Drop the released rows, and have room for so many more, and for as many as are held."""

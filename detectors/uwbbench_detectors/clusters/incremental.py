@@ -82,7 +82,7 @@ class IncrementalDbscan:
         if len(points) and not np.abs(points).max() < LARGEST_INDEX * self.radius.side:
             raise ValueError(
                 f"points lie farther than {LARGEST_INDEX * self.radius.side:g} from the origin, or nowhere: too far "
-                f"to tell neighbours within {self.radius.squared**0.5:g}"
+                f"to resolve neighbours within {self.radius.squared**0.5:g}"
             )
         self.grid = self.grid.with_room(len(points))
         room = self.grid.points[len(self) : len(self) + len(points)]
@@ -129,7 +129,18 @@ def dbscan(points: FloatArray, eps: float, min_samples: int) -> tuple[IntArray, 
 
 @compiled
 def insert(grid: Grid, start: int, stop: int, radius: Radius, min_samples: int) -> None:
-    """Take in the points ``start`` to ``stop``, and queue every point that a cluster takes in by that."""
+    """Take in the points ``start`` to ``stop``, and queue every point that a cluster takes in by that.
+
+    Parameters
+    ----------
+    grid : Grid
+        Holds the coordinates of these points already, with room for a cell of each; written.
+    start, stop : int
+        Places of the points in the order of arrival; all before ``start`` were taken in.
+    radius : Radius
+    min_samples : int
+        Points in the neighbourhood of a core point, itself included.
+    """
     points, cells = grid.points, grid.cells
     for new in range(start, stop):
         x, y = points[new].x, points[new].y

@@ -57,7 +57,7 @@ class GrowingRounds:
         start = len(self._dbscan)
         self._dbscan.put(points)
         decided = np.empty((3, start + len(points) - self._decided), np.int64)
-        found, self._clusters = _rounds(
+        written, self._clusters = _rounds(
             self._dbscan.grid,
             start,
             start + len(points),
@@ -67,8 +67,8 @@ class GrowingRounds:
             self._clusters,
             decided,
         )
-        self._decided += found
-        return Decided(*decided[:, :found])
+        self._decided += written
+        return Decided(*decided[:, :written])
 
 
 class WindowedRounds:
@@ -148,7 +148,7 @@ def _rounds(
     A component keeps the smallest number of those it was joined from. What a new component consists of was not
     decided before, so that its first core point is met here first.
     """
-    found = 0
+    written = 0
     place = 0
     while start < stop:
         end = min(start + every, stop)
@@ -166,11 +166,11 @@ def _rounds(
                 root = root_of(grid.parent, grid.points[point].cell)
             else:
                 root = root_of_border(grid, point)
-            decided[0, found] = point
-            decided[1, found] = grid.cells[root].number
-            decided[2, found] = place
-            found += 1
+            decided[0, written] = point
+            decided[1, written] = grid.cells[root].number
+            decided[2, written] = place
+            written += 1
         grid.used[2] = 0
         start = end
         place += 1
-    return found, clusters
+    return written, clusters

@@ -29,12 +29,23 @@ class _Square(NamedTuple):
 
 @compiled
 def core_point_near(grid: Grid, cell: int, x: float, y: float, radius: Radius) -> bool:
-    """Whether a core point of a cell is a neighbour of a point outside the cell."""
+    """Whether a core point of a cell is a neighbour of a point outside the cell.
+
+    Parameters
+    ----------
+    grid : Grid
+        Written where the search tree of the cell lacks core points.
+    cell : int
+        The cell that is searched.
+    x, y : float
+        Coordinates of the point.
+    radius : Radius
+    """
     if not bounds_reach(grid.cells[cell], x, y, radius):
         return False
     if grid.cells[cell].points >= SCANNED:
         _bring_up_to_date(grid, cell, radius)
-        return _found(grid, cell, x, y, radius)
+        return _tree_holds_neighbour(grid, cell, x, y, radius)
     point = grid.cells[cell].core
     while point >= 0:
         if neighbours(grid.points[point], x, y, radius):
@@ -89,7 +100,7 @@ def _plant(grid: Grid, cell: int, point: int, radius: Radius) -> None:
 
 
 @compiled
-def _found(grid: Grid, cell: int, x: float, y: float, radius: Radius) -> bool:
+def _tree_holds_neighbour(grid: Grid, cell: int, x: float, y: float, radius: Radius) -> bool:
     """Whether the tree holds a neighbour of a point; squares beyond the radius are passed over."""
     limit = np.sqrt(radius.squared) + (abs(x) + abs(y) + radius.side) * _ROUNDED
     nodes = np.empty(4 * grid.cells[cell].depth + 4, np.int32)  # to visit, and their squares

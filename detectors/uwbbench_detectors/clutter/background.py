@@ -1,6 +1,6 @@
 """Removal of what does not change from frame to frame: direct path, ringing of the chassis, standing structure.
 
-On a robot these stages are meant for what moves along with it. They cannot tell it from an obstacle that keeps its
+On a robot these stages are meant for what moves along with it. They cannot separate it from an obstacle that keeps its
 distance, which vanishes likewise: while the robot stands, or drives along a wall.
 """
 

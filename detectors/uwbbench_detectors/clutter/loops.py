@@ -42,6 +42,15 @@ def drop_rounding(residue: ComplexArray, samples: ComplexArray, operations: floa
 
     That error is at most ``operations`` epsilons of the frame's largest sample. Equal frames would otherwise leave a
     ripple in the last place, which a later normalisation would blow up to full scale.
+
+    Parameters
+    ----------
+    residue : (taps,) complex array
+        What is left of the frame; written.
+    samples : (taps,) complex array
+        The frame before anything was subtracted.
+    operations : float
+        Additions behind each tap of the residue.
     """
     bound = operations * EPSILON * largest_magnitude(samples)
     for tap in range(len(residue)):
@@ -56,6 +65,15 @@ def less_template(
     samples: ComplexArray, template: ComplexArray, weights: ComplexArray, operations: float
 ) -> ComplexArray:
     """Frames less a template (taps,), times the gain that the weights (taps,) give for each frame.
+
+    Parameters
+    ----------
+    samples : (frames, taps) complex array
+    template : (taps,) complex array
+    weights : (taps,) complex array
+        Their product with a frame, summed over the taps, is the gain of the template in it.
+    operations : float
+        Additions behind each tap of the residue, which bound its rounding error.
 
     Returns
     -------
@@ -76,6 +94,14 @@ def less_template(
 @compiled
 def less_projection(frame: ComplexArray, shapes: ComplexArray, operations: float) -> ComplexArray:
     """Frame (taps,) less its projection on orthonormal shapes (rank, taps).
+
+    Parameters
+    ----------
+    frame : (taps,) complex array
+    shapes : (rank, taps) complex array
+        Orthonormal rows; the conjugate of each is a shape that is projected out.
+    operations : float
+        Additions behind each tap of the residue, which bound its rounding error.
 
     Returns
     -------
@@ -153,6 +179,16 @@ def _finish_stretch(stretch: ComplexArray, tail: ComplexArray) -> None:
 @compiled
 def less_exponential(samples: ComplexArray, background: ComplexArray, gain: float, operations: float) -> ComplexArray:
     """Frames less the exponential average (taps,) of the frames before them, which is carried on.
+
+    Parameters
+    ----------
+    samples : (frames, taps) complex array
+    background : (taps,) complex array
+        Average of the frames before these; written, to be carried on.
+    gain : float
+        Weight of a new frame in the average, from 0 to 1.
+    operations : float
+        Additions behind each tap of the residue, which bound its rounding error.
 
     Returns
     -------

@@ -63,6 +63,11 @@ class SvdClutter(ClutterRemoval[SvdClutterParams]):
         From ``open``, if the rank is not smaller than the number of taps.
     """
 
+    @property
+    def every_nth(self) -> bool:
+        """Whether some frames are cleaned with the shapes of an earlier one."""
+        return self.params.every != 1
+
     def open(self, radar: Radar) -> None:
         """Start with an empty window."""
         super().open(radar)

@@ -28,7 +28,7 @@ MOST_NOISE_TAPS = 128
 class Chain:
     """A run of stages as settings of the search.
 
-    Stages are taken one after the other by :meth:`take`, as long as each stands where the search does its work:
+    Stages are taken one after the other by :meth:`take`, as long as each comes where the search does its work:
     signals, peaks, properties and filters of peaks, selection, then what describes the detections that are left.
 
     Parameters
@@ -194,7 +194,7 @@ def _select(chain: Chain, stage: Strongest | Nearest) -> bool:
     return True
 
 
-def _nothing(_chain: Chain, _stage: All) -> bool:
+def _retain_all(_chain: Chain, _stage: All) -> bool:
     return True
 
 
@@ -254,7 +254,7 @@ _TAKES: dict[type[Stage[Any]], tuple[tuple[int, ...], Callable[[Chain, Any], boo
     SnrFilter: ((JUDGED,), _audible),
     Pdoa: ((JUDGED, SELECTED), _phase),
     PdoaFilter: ((JUDGED,), _sector),
-    All: ((JUDGED, SELECTED), _nothing),
+    All: ((JUDGED, SELECTED), _retain_all),
     Strongest: ((SELECTED,), _select),
     Nearest: ((SELECTED,), _select),
     Interpolate: ((MOVED,), _interpolate),

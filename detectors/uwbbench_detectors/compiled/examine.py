@@ -2,7 +2,7 @@
 
 Filters that look at single peaks commute, and the strongest peak that passes them all is the first one to pass by
 falling amplitude. So where one is wanted, peaks are examined in that order, each by the cheapest question first, and
-what nobody asks for is never computed. After a few rejections all peaks are described in one pass instead, whose cost
+what is not needed is never computed. After a few rejections all peaks are described in one pass instead, whose cost
 grows with the taps alone.
 """
 
@@ -96,7 +96,23 @@ def examine_sets(
     stop: int,
     passed: FloatArray,
 ) -> int:
-    """Keep the strongest peak of a short frame that passes; else as :func:`examine_by_strength`."""
+    """Keep the strongest peak of a short frame that passes; else as :func:`examine_by_strength`.
+
+    Parameters
+    ----------
+    amplitude : (room,) array
+        Magnitudes, with room for whole blocks of taps.
+    profile : (room,) array
+        Curve that is searched, counted from the first tap of the frame, with the same room.
+    responses1, responses2, how, limits, signal
+        As of :func:`examine_by_strength`.
+    inside : int
+        Set of the taps of the profile.
+    stop : int
+        Taps of the frame, at most LANES.
+    passed : (rows, columns) array
+        Row 0 takes the properties of the peak, in the order of ``layout.COLUMNS``.
+    """
     start = how[at.PROFILE_START]
     waiting, flat = short.maxima(profile, start, stop)
     if flat:
@@ -133,7 +149,31 @@ def examine_by_strength(
     strengths: IntArray,
     passed: FloatArray,
 ) -> int:
-    """Keep the strongest peak that passes: how many do, UNCLEAR where rounding could decide, or MORE after many."""
+    """Keep the strongest peak that passes: how many do, UNCLEAR where rounding could decide, or MORE after many.
+
+    Parameters
+    ----------
+    amplitude : (taps,) array
+        Magnitudes.
+    profile : (taps - start,) array
+        Curve that is searched, from the tap PROFILE_START on.
+    responses1, responses2 : (frames, taps) complex array
+        Responses behind the phase difference, where it is computed; unused otherwise.
+    how, limits : tuple
+        Settings, laid out as in :mod:`uwbbench_detectors.compiled.layout`.
+    signal : Signal
+        The frame's row, noise and first path.
+    heights, strengths : (taps - start,) int array
+        Bits of the profile and of the magnitudes under it.
+    passed : (rows, columns) array
+        Row 0 takes the properties of the peak, in the order of ``layout.COLUMNS``.
+
+    Returns
+    -------
+    int
+        0 or 1; UNCLEAR where rounding could decide; MORE where TRIED_SINGLY peaks have failed, or the profile has flat
+        tops.
+    """
     start = how[at.PROFILE_START]
     weakest = signal.noise * limits[at.LEAST_RATIO]
     bound, best = STRONGER_THAN_ALL, -1
@@ -170,7 +210,18 @@ def examine_all(
     passed: FloatArray,
     single: bool,
 ) -> int:
-    """Keep the peaks that pass, by rising tap, or the strongest: how many, or UNCLEAR where rounding could decide."""
+    """Keep the peaks that pass, by rising tap, or the strongest: how many, or UNCLEAR where rounding could decide.
+
+    Parameters
+    ----------
+    amplitude, profile, responses1, responses2, how, limits, signal
+        As of :func:`examine_by_strength`.
+    passed : (rows, columns) array
+        The first rows take the properties of the peaks kept, in the order of ``layout.COLUMNS``; at least two rows, and
+        one for each peak there may be if all are kept.
+    single : bool
+        Keep the strongest of those that pass, in row 0.
+    """
     start = how[at.PROFILE_START]
     marked, places = np.empty(len(profile), np.uint8), np.empty(len(profile), np.int64)
     peaks = places[: find_maxima(profile, marked, places)]

@@ -21,7 +21,17 @@ FLAT = -2
 
 @compiled
 def find_extremes(amplitude: FloatArray, start: int, ends: FloatArray) -> None:
-    """Write the smallest and the largest magnitude from tap ``start`` on into ``ends`` (2,)."""
+    """Write the smallest and the largest magnitude from tap ``start`` on into ``ends`` (2,).
+
+    Parameters
+    ----------
+    amplitude : (taps,) array
+        Magnitudes.
+    start : int
+        First tap that counts.
+    ends : (2,) array
+        Written: smallest, largest.
+    """
     bits, written = amplitude.view(np.int64), ends.view(np.int64)
     low = high = bits[start]
     for tap in range(start, len(bits)):
@@ -36,7 +46,15 @@ def _scaled_square(value: float, largest: float) -> float:
 
 @inlined
 def root_mean_square(amplitude: FloatArray, start: int, stop: int) -> float:
-    """Root mean square of taps ``start`` to ``stop``, scaled by the largest and added up as numpy does."""
+    """Root mean square of taps ``start`` to ``stop``, scaled by the largest and added up as numpy does.
+
+    Parameters
+    ----------
+    amplitude : (taps,) array
+        Magnitudes.
+    start, stop : int
+        First tap, and the one behind the last; at least one tap and, for numpy's order, at most 128.
+    """
     largest = 0.0
     for tap in range(start, stop):
         largest = max(largest, amplitude[tap])
@@ -69,7 +87,15 @@ def median_noise(amplitude: FloatArray) -> float:
 
 @compiled
 def crest_tap(amplitude: FloatArray, start: int, stop: int) -> int:
-    """First of the largest magnitudes of taps ``start`` to ``stop``."""
+    """First of the largest magnitudes of taps ``start`` to ``stop``.
+
+    Parameters
+    ----------
+    amplitude : (taps,) array
+        Magnitudes.
+    start, stop : int
+        First tap, and the one behind the last; ``start`` is the answer where that leaves none.
+    """
     best = start
     for tap in range(start + 1, stop):
         if amplitude[tap] > amplitude[best]:
@@ -80,6 +106,15 @@ def crest_tap(amplitude: FloatArray, start: int, stop: int) -> int:
 @compiled
 def vertex_shift(amplitude: FloatArray, tap: int, logarithmic: bool) -> tuple[float, bool]:
     """Distance in taps from a crest to the vertex of the parabola through three magnitudes.
+
+    Parameters
+    ----------
+    amplitude : (taps,) array
+        Magnitudes.
+    tap : int
+        Where the crest is.
+    logarithmic : bool
+        Take the parabola through the logarithms, where none of the three magnitudes is zero.
 
     Returns
     -------
@@ -105,8 +140,8 @@ def vertex_shift(amplitude: FloatArray, tap: int, logarithmic: bool) -> tuple[fl
 def strongest_crest(heights: IntArray, strengths: IntArray, earliest: int, bound: int, bound_place: int) -> int:
     """Place in the profile of the strongest maximum that is left to examine; -1 for none, or FLAT.
 
-    Where the profile rises to a tap and goes on level anywhere, other functions must tell what is a maximum. All taps
-    are looked at alike, many at once, and without a branch, since which of them are maxima cannot be foretold.
+    Where the profile rises to a tap and goes on level anywhere, other functions must decide what is a maximum. All taps
+    are looked at alike, many at once, and without a branch, since which of them are maxima cannot be predicted.
 
     Parameters
     ----------
@@ -128,19 +163,25 @@ def strongest_crest(heights: IntArray, strengths: IntArray, earliest: int, bound
         best = max(best, strengths[place] if crest & left else np.int64(-1))
     if flat:
         return FLAT
-    found = last
+    strongest = last
     for place in range(1, last):
         crest = (heights[place] > heights[place - 1]) & (heights[place] > heights[place + 1]) & (place >= earliest)
         left = (best < bound) | (place > bound_place)
-        found = min(found, place if crest & left & (strengths[place] == best) else last)
-    return found if found < last else -1
+        strongest = min(strongest, place if crest & left & (strengths[place] == best) else last)
+    return strongest if strongest < last else -1
 
 
 @compiled
 def find_maxima(profile: FloatArray, marked: Any, peaks: IntArray) -> int:
     """Write the taps of all local maxima, the middle of flat ones rounded down; how many they are.
 
-    ``marked`` (taps,) is room for a mark of each tap.
+    Parameters
+    ----------
+    profile : (taps,) array
+    marked : (taps,) uint8 array
+        Room for a mark of each tap; written.
+    peaks : (taps,) int array
+        Written: the taps, rising; what lies behind them means nothing.
     """
     bits = profile.view(np.int64)
     last = len(bits) - 1
@@ -150,7 +191,7 @@ def find_maxima(profile: FloatArray, marked: Any, peaks: IntArray) -> int:
         marked[tap] = rises & (bits[tap] >= bits[tap + 1])
         flat += rises & (bits[tap] == bits[tap + 1])
     count = 0
-    for tap in range(1, last):  # without a branch: which taps are maxima cannot be foretold
+    for tap in range(1, last):  # without a branch: which taps are maxima cannot be predicted
         peaks[count] = tap
         count += marked[tap]
     return _without_shoulders(bits, peaks, count) if flat else count

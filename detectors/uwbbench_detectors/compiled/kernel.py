@@ -22,7 +22,7 @@ WORTH_SHARING = 1024
 WORTH_A_CALL = 16
 """Frames between two irregular ones that are searched along sooner than by a call of their own."""
 
-_NOTHING: FloatArray = np.zeros(1)
+_NO_VALUES: FloatArray = np.zeros(1)
 _NO_POSES: FloatArray = np.zeros((1, 3))
 
 
@@ -48,7 +48,7 @@ class FrameSearch(Kernel):
         self._phased, self._placed = bool(chain.how[at.PHASED]), bool(chain.how[at.PLACED])
         self._aligned = bool(chain.how[at.ALIGNED])
         self._alone = not (self._given or self._phased or self._placed)
-        self._told = np.zeros(at.TOLD, np.int64)
+        self._noise_tally = np.zeros(at.NOISE_TALLY, np.int64)
         self._irregular = np.empty(1, np.bool_)
         self._plain = [_apart(stage) for stage in stages]
         self._noise = next((stage for stage in stages if isinstance(stage, NoiseFloor)), None)
@@ -71,29 +71,29 @@ class FrameSearch(Kernel):
         if len(irregular) != count:
             self._irregular = irregular = np.empty(count, np.bool_)
         if self._alone and count < WORTH_SHARING:  # most calls of a stream, in which every step counts
-            found = self._search_alone(
+            written = self._search_alone(
                 samples if samples.flags.carray else np.array(samples),
                 frames.valid,
                 frames.first,
                 self._how,
                 self._limits,
                 self._order,
-                self._told,
+                self._noise_tally,
                 table,
                 irregular,
             )
         elif self._pool is not None and self._one_a_frame and count >= WORTH_SHARING:
-            found = self._shared(self._pool, frames, first_path, table, irregular)
+            written = self._shared(self._pool, frames, first_path, table, irregular)
         else:
-            found = self._searched(frames, first_path, self._told, table, irregular)
+            written = self._searched(frames, first_path, self._noise_tally, table, irregular)
         if self._judging is not None:
             self._judge(self._judging)
-        plainly = found < 0
+        plainly = written < 0
         if plainly:
-            found = -1 - found
-        if found < capacity:
-            table = table[:found]
-            if 2 * found < capacity:  # do not keep the room of a table that stayed nearly empty
+            written = -1 - written
+        if written < capacity:
+            table = table[:written]
+            if 2 * written < capacity:  # do not keep the room of a table that stayed nearly empty
                 table = table.copy()
         made = Detections.of_table(self._names, table, (frames.first, frames.valid), self.notes)
         return self._with_plain(made, frames, first_path, irregular) if plainly else made
@@ -111,16 +111,16 @@ class FrameSearch(Kernel):
         self,
         frames: Frames,
         first_path: FloatArray | None,
-        told: IntArray,
+        noise_tally: IntArray,
         table: FloatArray,
         irregular: BoolArray,
     ) -> int:
         """Search a block; rows found, or -1 less that where some frames must be searched by the plain stages."""
         samples = _plain(frames.preamble)
-        settings = frames.first, self._how, self._limits, self._order, told, table, irregular
+        settings = frames.first, self._how, self._limits, self._order, noise_tally, table, irregular
         if self._alone:
             return self._search_alone(samples, frames.valid, *settings)
-        given = path = path1 = path2 = yaw_rad = _NOTHING
+        given = path = path1 = path2 = yaw_rad = _NO_VALUES
         robot_m = _NO_POSES
         response1 = response2 = samples
         if self._given:
@@ -149,33 +149,33 @@ class FrameSearch(Kernel):
         """Search a block with several threads, each its own part."""
         cuts = [len(frames) * part // self.threads for part in range(self.threads + 1)]
 
-        def searched(start: int, stop: int, told: IntArray) -> int:
+        def searched(start: int, stop: int, noise_tally: IntArray) -> int:
             path = None if first_path is None else first_path[start:stop]
             part = slice(start, stop)
-            return self._searched(frames.part(start, stop), path, told, table[part], irregular[part])
+            return self._searched(frames.part(start, stop), path, noise_tally, table[part], irregular[part])
 
         judged = np.array([FRAMES_TO_JUDGE, 0])
         others = [pool.submit(searched, *ends, judged.copy()) for ends in pairwise(cuts[1:])]
-        founds = [searched(cuts[0], cuts[1], self._told), *(other.result() for other in others)]
-        if self._judging is not None and self._told[at.JUDGED] < FRAMES_TO_JUDGE:
+        counts = [searched(cuts[0], cuts[1], self._noise_tally), *(other.result() for other in others)]
+        if self._judging is not None and self._noise_tally[at.JUDGED] < FRAMES_TO_JUDGE:
             # The first part had too few frames to judge the noise by: look at the others again, in their order.
-            founds[1:] = [searched(*ends, self._told) for ends in pairwise(cuts[1:])]
+            counts[1:] = [searched(*ends, self._noise_tally) for ends in pairwise(cuts[1:])]
         total = 0
-        for start, found in zip(cuts, founds, strict=False):
-            rows = max(found, -1 - found)
+        for start, written in zip(cuts, counts, strict=False):
+            rows = max(written, -1 - written)
             table[total : total + rows] = table[start : start + rows]
             total += rows
-        return -1 - total if min(founds) < 0 else total
+        return -1 - total if min(counts) < 0 else total
 
     def _with_plain(
-        self, found: Detections, frames: Frames, first_path: FloatArray | None, irregular: BoolArray
+        self, regular: Detections, frames: Frames, first_path: FloatArray | None, irregular: BoolArray
     ) -> Detections:
         """Detections with those of irregular frames, which the stages themselves search.
 
         Frames that lie near each other are searched together, and what the stages find between them is found already.
         """
         rows = np.flatnonzero(irregular)
-        parts = [found]
+        parts = [regular]
         for near in np.split(rows, np.flatnonzero(np.diff(rows) > WORTH_A_CALL) + 1):
             start, stop = int(near[0]), int(near[-1]) + 1
             path = None if first_path is None else first_path[start:stop]
@@ -191,17 +191,17 @@ class FrameSearch(Kernel):
         self.gather_notes()
         joined = Detections.join(parts)
         ordered = joined.take(np.argsort(joined.frame, kind="stable"))
-        return ordered.annotated(processed=found.processed, notes=self.notes)
+        return ordered.annotated(processed=regular.processed, notes=self.notes)
 
     def _judge(self, noise: NoiseFloor) -> None:
         """Hand on what was counted of the leading taps, until the noise floor has its verdict."""
-        judged = int(self._told[at.JUDGED])
-        noise.tally(judged, int(self._told[at.SUSPICIOUS]))
+        judged = int(self._noise_tally[at.JUDGED])
+        noise.tally(judged, int(self._noise_tally[at.SUSPICIOUS]))
         self._judging = noise if judged < FRAMES_TO_JUDGE else None
         self.gather_notes()
 
     def _read_at_same_tap(self, frames: Frames) -> None:
-        """Let the phase stage say why responses are read at the preamble's tap, and do so."""
+        """Let the phase stage note why responses are read at the preamble's tap, and do so."""
         self._how[at.ALIGNED] = 0
         phase = next(stage for stage in self.stages if isinstance(stage, Pdoa))
         phase.alignment(frames)

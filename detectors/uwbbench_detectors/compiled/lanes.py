@@ -1,6 +1,6 @@
 """Operations on up to 64 taps at once, where a set of taps is the bits of one whole number: bit i stands for tap i.
 
-What loops and branches tell of one tap after the other (what is the nearest tap that is higher?) is then a comparison
+What loops and branches decide of one tap after the other (what is the nearest tap that is higher?) is then a comparison
 of all taps and a scan for a bit. numba has no such types, so that these few are written in the language of LLVM, which
 makes of them whatever the processor has for it, from one instruction for eight taps down to one tap at a time.
 
@@ -30,12 +30,12 @@ _LARGEST = (1 << 63) - 1
 
 
 def operation(typed: Callable[..., Any]) -> Any:
-    """Function that numba compiles as told; it takes types, and returns a signature and what builds the code."""
+    """Function that numba compiles by rules of its own: of its types, the signature and what builds the code."""
     return intrinsic(typed)
 
 
 def _pointer(context: Any, builder: Any, kind: Any, array: Any, at: Any, pointed: Any) -> Any:
-    """Pointer to element ``at`` of an array, as one to something larger."""
+    """Pointer to element ``at`` of an array, as one to a larger type."""
     data = context.make_array(kind)(context, builder, array).data
     return builder.bitcast(builder.gep(data, [at]), pointed.as_pointer())
 
@@ -139,7 +139,17 @@ taps_behind = operation(_scan("ctlz"))
 
 @operation
 def measure_block(_typing: Any, samples: Any, _row: Any, _tap: Any, amplitude: Any) -> Any:
-    """``measure_block(samples, row, tap, amplitude)``: magnitudes of BLOCK taps of a row of samples from a tap on."""
+    """``measure_block(samples, row, tap, amplitude)``: magnitudes of BLOCK taps of a row of samples from a tap on.
+
+    Parameters
+    ----------
+    _typing : Any
+        numba's typing context.
+    samples, amplitude : numba types
+        Of a (frames, taps) complex64 or complex128 array, and of the (room,) float64 array that is written.
+    _row, _tap : numba types
+        Of the row, and of the first of the BLOCK taps.
+    """
     part = ir.FloatType() if samples.dtype == types.complex64 else _REAL
 
     def lowered(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
@@ -162,7 +172,19 @@ def measure_block(_typing: Any, samples: Any, _row: Any, _tap: Any, amplitude: A
 
 @operation
 def scale_block(_typing: Any, amplitude: Any, _tap: Any, _low: Any, _span: Any, profile: Any) -> Any:
-    """``scale_block(amplitude, tap, low, span, profile)``: ``(amplitude - low) / span`` of BLOCK taps from a tap on."""
+    """``scale_block(amplitude, tap, low, span, profile)``: ``(amplitude - low) / span`` of BLOCK taps from a tap on.
+
+    Parameters
+    ----------
+    _typing : Any
+        numba's typing context.
+    amplitude, profile : numba types
+        Of two (room,) float64 arrays: magnitudes, and the profile that is written.
+    _tap : numba type
+        Of the first of the BLOCK taps.
+    _low, _span : numba types
+        Of the least magnitude of the frame, and of its distance to the largest.
+    """
 
     def lowered(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         source, tap, low, span, written = arguments

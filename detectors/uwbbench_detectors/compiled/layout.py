@@ -81,9 +81,9 @@ RANGED_NONE, RANGED_EXACT, RANGED_SINE = range(3)
 ) = range(26)
 LIMITS = 26
 
-# What a call tells beside the rows.
+# Whole numbers counted on from call to call: frames by which the noise was judged, and the suspicious ones of them.
 JUDGED, SUSPICIOUS = range(2)
-TOLD = 2
+NOISE_TALLY = 2
 
 NEAR = 1e-9
 """A decision that hangs on a logarithm or an angle closer to its limit than this is left to the plain stages."""

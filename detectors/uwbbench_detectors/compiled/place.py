@@ -26,7 +26,22 @@ def _phase(samples: Any, row: int, tap: float) -> float:
 
 @compiled
 def phase_difference(first: Any, second: Any, row: int, taps: tuple[float, float], wrapped_above: bool) -> float:
-    """Phase of the second response of a row less that of the first, each at its own tap, wrapped."""
+    """Phase of the second response of a row less that of the first, each at its own tap, wrapped.
+
+    Parameters
+    ----------
+    first, second : (frames, taps) complex arrays
+    row : int
+    taps : (float, float)
+        Where the first and the second response are read, each at the nearest sample.
+    wrapped_above : bool
+        Wrap into (-pi, pi] instead of [-pi, pi).
+
+    Returns
+    -------
+    float
+        Radians; NaN where a tap lies outside the window, or its sample is zero.
+    """
     alpha = _phase(second, row, taps[1]) - _phase(first, row, taps[0])
     if wrapped_above:
         alpha = -alpha
@@ -47,7 +62,22 @@ def azimuth_of(pdoa_rad: float, limits: FloatArray) -> float:
 
 @inlined
 def range_of(delay_s: float, azimuth_rad: float, how: IntArray, limits: FloatArray) -> float:
-    """Bistatic range, as uwbbench.api.geometry has it; boresight where the azimuth is not known."""
+    """Bistatic range, as uwbbench.api.geometry has it; boresight where the azimuth is not known.
+
+    Parameters
+    ----------
+    delay_s : float
+        Delay after the first path.
+    azimuth_rad : float
+        From boresight, positive to the left; NaN if not known.
+    how, limits : tuple
+        Settings, laid out as in :mod:`uwbbench_detectors.compiled.layout`.
+
+    Returns
+    -------
+    float
+        Metres from the receiver; NaN where the path is shorter than the baseline.
+    """
     cosine, sine = 1.0, 0.0
     if not math.isnan(azimuth_rad):
         cosine, sine = math.cos(azimuth_rad), math.sin(azimuth_rad)
@@ -69,7 +99,26 @@ def range_of(delay_s: float, azimuth_rad: float, how: IntArray, limits: FloatArr
 def position_of(
     range_m: float, azimuth_rad: float, robot_m: FloatArray, yaw_rad: float, limits: FloatArray
 ) -> tuple[float, float]:
-    """World coordinates of a target at a range and azimuth from a receiver mounted on a robot."""
+    """World coordinates of a target at a range and azimuth from a receiver mounted on a robot.
+
+    Parameters
+    ----------
+    range_m : float
+        From the receiver.
+    azimuth_rad : float
+        From boresight, positive to the left.
+    robot_m : (3,) array
+        Position of the robot in the world.
+    yaw_rad : float
+        Heading of the robot.
+    limits : tuple
+        Settings with the receiver's mount, laid out as in :mod:`uwbbench_detectors.compiled.layout`.
+
+    Returns
+    -------
+    x, y : float
+        Metres.
+    """
     cosine, sine = math.cos(yaw_rad), math.sin(yaw_rad)
     x = robot_m[0] + (cosine * limits[at.MOUNT_X] - sine * limits[at.MOUNT_Y])
     y = robot_m[1] + (sine * limits[at.MOUNT_X] + cosine * limits[at.MOUNT_Y])

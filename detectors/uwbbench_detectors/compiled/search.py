@@ -6,9 +6,8 @@ import math
 from typing import Any
 
 import numpy as np
-from numba.np.unsafe.ndarray import to_fixed_tuple
 
-from uwbbench.api import FloatArray, IntArray, compiled, inlined
+from uwbbench.api import FloatArray, IntArray, as_tuple, compiled, inlined
 from uwbbench_detectors.compiled import layout as at
 from uwbbench_detectors.compiled import short
 from uwbbench_detectors.compiled.examine import MORE, UNCLEAR, Signal, examine_all, examine_by_strength, examine_sets
@@ -17,9 +16,6 @@ from uwbbench_detectors.compiled.lanes import BLOCK, LANES, largest_of, least_of
 from uwbbench_detectors.compiled.layout import HOW, LIMITS, NEAR
 from uwbbench_detectors.compiled.place import azimuth_of, position_of, range_of
 from uwbbench_detectors.peaks.noise import FRAMES_TO_JUDGE, SUSPICIOUS_RATIO
-
-as_tuple: Any = to_fixed_tuple
-"""Settings as values of their own: those of an array are read anew after whatever is written to any array."""
 
 
 @inlined
@@ -33,12 +29,12 @@ def _noise(amplitude: FloatArray, how: IntArray) -> float:
 
 
 @compiled
-def _judge(amplitude: FloatArray, how: IntArray, told: IntArray) -> None:
+def _judge(amplitude: FloatArray, how: IntArray, noise_tally: IntArray) -> None:
     """Count a frame, and whether its leading taps hold more than the noise of the last ones."""
     taps = how[at.NOISE_TAPS]
     tail = root_mean_square(amplitude, len(amplitude) - taps, len(amplitude))
-    told[at.JUDGED] += 1
-    told[at.SUSPICIOUS] += root_mean_square(amplitude, 0, taps) > SUSPICIOUS_RATIO * tail
+    noise_tally[at.JUDGED] += 1
+    noise_tally[at.SUSPICIOUS] += root_mean_square(amplitude, 0, taps) > SUSPICIOUS_RATIO * tail
 
 
 @inlined
@@ -123,7 +119,7 @@ def search(
     settings: IntArray,
     bounds: FloatArray,
     order: IntArray,
-    told: IntArray,
+    noise_tally: IntArray,
     table: FloatArray,
     irregular: Any,
 ) -> int:
@@ -135,20 +131,20 @@ def search(
     valid : (frames,) bool array
         Frames that are searched.
     given : (frames,) array
-        First path, where an earlier stage has found it; else anything.
+        First path, where an earlier stage has found it; unused otherwise.
     responses1, responses2 : (frames, taps) complex array
-        Responses behind the phase difference, where it is asked for; else anything.
+        Responses behind the phase difference, where it is computed; unused otherwise.
     path, path1, path2 : (frames,) array
-        Reported first paths of preamble and responses, where taps are aligned by them; else anything.
+        Reported first paths of preamble and responses, where taps are aligned by them; unused otherwise.
     robot_m, yaw_rad : (frames, 3), (frames,) array
-        Poses, where positions are asked for; else anything.
+        Poses, where positions are computed; unused otherwise.
     first : int
         Index of the first frame.
     settings, bounds : arrays
         How the search goes and its limits, as laid out in :mod:`uwbbench_detectors.compiled.layout`.
     order : (columns,) int array
         Which of all columns are written, in this order.
-    told : (TOLD,) int array
+    noise_tally : (NOISE_TALLY,) int array
         Frames judged and suspicious so far, which are counted on up to FRAMES_TO_JUDGE.
     table : (rows, 1 + columns) array
         Written: the detections, by frame and then tap; the first column holds the bits of the index of the frame.
@@ -160,6 +156,7 @@ def search(
     int
         Detections found; -1 less that if frames are irregular.
     """
+    # As values of their own: those of an array are read anew after whatever is written to any array.
     how, limits = as_tuple(settings, HOW), as_tuple(bounds, LIMITS)
     start, stop = how[at.PROFILE_START], samples.shape[1]
     single = how[at.SELECT] == at.SELECT_STRONGEST and how[at.COUNT] == 1
@@ -178,7 +175,7 @@ def search(
     retained = np.empty(len(passed), np.uint8)
     frame = table.view(np.int64)
     clear = True
-    found = 0
+    written = 0
     for row in range(len(samples)):
         irregular[row] = False
         if not valid[row]:
@@ -194,8 +191,8 @@ def search(
             for tap in range(start):
                 highest = max(highest, amplitude[tap])
         regular = highest < np.inf
-        if how[at.NOISE] == at.NOISE_LEADING and told[at.JUDGED] < FRAMES_TO_JUDGE and regular and highest > 0:
-            _judge(amplitude, how, told)
+        if how[at.NOISE] == at.NOISE_LEADING and noise_tally[at.JUDGED] < FRAMES_TO_JUDGE and regular and highest > 0:
+            _judge(amplitude, how, noise_tally)
         if scaled and regular and not short.scale(strengths_room, stop, low, high, heights_room):
             continue
         first_path, close = _first_path(
@@ -238,11 +235,11 @@ def search(
         for number in range(kept):
             if single or retained[number]:
                 _finish(passed, number, amplitude, first_path, robot_m, yaw_rad, row, how, limits)
-                frame[found, 0] = first + row
+                frame[written, 0] = first + row
                 for column in range(len(order)):
-                    table[found, 1 + column] = passed[number, order[column]]
-                found += 1
-    return found if clear else -1 - found
+                    table[written, 1 + column] = passed[number, order[column]]
+                written += 1
+    return written if clear else -1 - written
 
 
 @compiled
@@ -253,28 +250,43 @@ def search_alone(
     how: IntArray,
     limits: FloatArray,
     order: IntArray,
-    told: IntArray,
+    noise_tally: IntArray,
     table: FloatArray,
     irregular: Any,
 ) -> int:
-    """Search where nothing but the samples is needed: a short call is cheaper with fewer arrays to hand over."""
-    anything = limits
+    """Search where only the samples are needed: a short call is cheaper with fewer arrays to hand over.
+
+    Parameters
+    ----------
+    samples, valid, first : arrays and int
+        As of :func:`search`.
+    how, limits : (HOW,) int array, (LIMITS,) array
+        The ``settings`` and ``bounds`` of :func:`search`, which must need no other input.
+    order, noise_tally, table, irregular : arrays
+        As of :func:`search`; the last three are written.
+
+    Returns
+    -------
+    int
+        As of :func:`search`.
+    """
+    unused = limits
     return search(
         samples,
         valid,
-        anything,
+        unused,
         samples,
         samples,
-        anything,
-        anything,
-        anything,
+        unused,
+        unused,
+        unused,
         table,
-        anything,
+        unused,
         first,
         how,
         limits,
         order,
-        told,
+        noise_tally,
         table,
         irregular,
     )

@@ -66,6 +66,16 @@ def width_of(profile: FloatArray, tap: int, prominence: float, relative_height: 
     """Width in taps of a peak at a share of its prominence below the crest.
 
     The level lies above the lower ground on either side, so that both searches end inside the profile.
+
+    Parameters
+    ----------
+    profile : (taps,) array
+    tap : int
+        Place of the peak in it.
+    prominence : float
+        In units of the profile.
+    relative_height : float
+        Share of the prominence, at most 0.9: by rounding, a deeper level could lie below the ground.
     """
     level = profile[tap] - prominence * relative_height
     start = tap

@@ -30,9 +30,9 @@ class Strongest(RankFilter[SelectionParams]):
     consumes: ClassVar[frozenset[str]] = ports("detections", "amplitude", "tap")
     fidelity = "from-source"
 
-    def rank(self, found: Detections) -> tuple[FloatArray, ...]:
+    def rank(self, detections: Detections) -> tuple[FloatArray, ...]:
         """Falling amplitude, then the tap."""
-        return -found["amplitude"], found["tap"]
+        return -detections["amplitude"], detections["tap"]
 
 
 class Nearest(RankFilter[SelectionParams]):
@@ -40,9 +40,9 @@ class Nearest(RankFilter[SelectionParams]):
 
     consumes: ClassVar[frozenset[str]] = ports("detections", "tap")
 
-    def rank(self, found: Detections) -> tuple[FloatArray, ...]:
+    def rank(self, detections: Detections) -> tuple[FloatArray, ...]:
         """The tap."""
-        return (found["tap"],)
+        return (detections["tap"],)
 
 
 class AllParams(Params):

@@ -18,6 +18,16 @@ def vertex_shift(before: float, crest: float, after: float) -> float:
     """Distance from a crest to the vertex of the parabola through the logarithms of three magnitudes.
 
     What :func:`uwbbench_detectors.peaks.interpolation.vertex_shift` gives for one crest.
+
+    Parameters
+    ----------
+    before, crest, after : float
+        Magnitudes at consecutive points, not negative.
+
+    Returns
+    -------
+    float
+        Points, between -0.5 and 0.5; 0 where the crest is zero or the parabola opens upwards.
     """
     if not crest > 0:
         return 0.0
@@ -35,13 +45,13 @@ def highest(real: FloatArray, imaginary: FloatArray) -> int:
 
     ``hypot``, which neither over- nor underflows, is taken only where it may exceed the largest so far.
     """
-    largest, found = 0.0, 0
+    largest, crest = 0.0, 0
     for place in range(len(real)):
         if max(abs(real[place]), abs(imaginary[place])) * ROOT_2 > largest:
             height = math.hypot(real[place], imaginary[place])
             if height > largest:
-                largest, found = height, place
-    return found
+                largest, crest = height, place
+    return crest
 
 
 @compiled

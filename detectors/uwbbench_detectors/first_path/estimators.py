@@ -56,7 +56,7 @@ class CrestSearch(FirstPath[S]):
     """
 
     def open(self, radar: Radar) -> None:
-        """Check that there is something to search."""
+        """Check that there are taps to search."""
         super().open(radar)
         if radar.noise_taps >= radar.taps:
             raise ConfigError(f"first path: all {radar.taps} taps precede the first arrival (noise_taps)")
@@ -85,6 +85,7 @@ class CrestFirstPath(CrestSearch[CrestFirstPathParams]):
     of the first path from the response itself).
     """
 
+    implied = True
     fidelity = "from-source"
 
     def taps_of(self, block: Block) -> FloatArray:

@@ -42,7 +42,7 @@ class Interpolate(Stage[InterpolateParams]):
     rowwise: ClassVar[bool] = True
 
     def step(self, block: Block) -> Block:
-        """Block whose detections stand at fractional taps."""
+        """Block whose detections lie at fractional taps."""
         amplitude = block.frames.amplitude
         whole = np.rint(block.detections["tap"]).astype(np.int64)
         inside = np.flatnonzero((whole > 0) & (whole < amplitude.shape[1] - 1))
@@ -74,7 +74,7 @@ def vertex_shift(
     """
     # Relative to the crest, so that neither very small nor very large magnitudes under- or overflow.
     unit = np.where(crest > 0, crest, 1.0)
-    with np.errstate(over="ignore"):  # beside something 1e308 times as high, where no vertex is looked for
+    with np.errstate(over="ignore"):  # beside a magnitude 1e308 times as high, where no vertex is looked for
         fall = np.stack([(before - crest) / unit, (after - crest) / unit])
     if method == "log_parabola":
         positive = (fall > -1).all(axis=0) & (crest > 0)

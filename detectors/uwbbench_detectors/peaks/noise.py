@@ -89,6 +89,7 @@ class NoiseFloor(Stage[NoiseFloorParams]):
 
     consumes: ClassVar[frozenset[str]] = ports("frames")
     produces: ClassVar[frozenset[str]] = ports("noise")
+    implied: ClassVar[bool] = True
     fidelity = "from-source"
 
     def open(self, radar: Radar) -> None:

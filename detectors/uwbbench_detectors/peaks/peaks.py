@@ -48,7 +48,7 @@ class Peaks(Stage[PeaksParams]):
         profile = block.part("profile")
         row, column, prominence, width = peaks_of(profile, self.params.relative_height, self.params.window_taps)
         tap = column + block.profile_start
-        found = Detections(
+        detections = Detections(
             block.frames.index[row],
             processed=block.frames.index,
             tap=tap,
@@ -56,7 +56,7 @@ class Peaks(Stage[PeaksParams]):
             prominence=prominence,
             width_taps=width,
         )
-        return block.replace(detections=found)
+        return block.replace(detections=detections)
 
 
 def peaks_of(

@@ -13,6 +13,14 @@ from uwbbench.api import Block, ConfigError, Detections, FloatArray, Params, Rad
 def profile_start(name: str, skip_taps: int | None, radar: Radar) -> int:
     """First tap of the profile.
 
+    Parameters
+    ----------
+    name : str
+        The stage, for the message.
+    skip_taps : int or None
+        Leading taps left out; None: the radar's ``noise_taps``.
+    radar : Radar
+
     Raises
     ------
     ConfigError
@@ -80,6 +88,7 @@ class MinMaxProfile(Stage[MinMaxProfileParams]):
 
     consumes: ClassVar[frozenset[str]] = ports("frames")
     produces: ClassVar[frozenset[str]] = ports("profile")
+    implied: ClassVar[bool] = True
     fidelity = "from-source"
 
     def open(self, radar: Radar) -> None:

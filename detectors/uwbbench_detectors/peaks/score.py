@@ -32,7 +32,7 @@ class SnrScoreParams(Params):
 class SnrScore(Stage[SnrScoreParams]):
     """Score ``20 log10(A / A_noise) + k delay`` of arXiv 2512.01018, in dB.
 
-    A ratio to a noise floor that is zero is no measure of anything: it would be infinite for the weakest ripple and
+    A ratio to a noise floor that is zero is no measure: it would be infinite for the weakest ripple and
     pass every threshold. Where the noise or the amplitude is not positive and finite the score is NaN, which no filter
     accepts, and a note says so.
 
@@ -44,6 +44,7 @@ class SnrScore(Stage[SnrScoreParams]):
 
     consumes: ClassVar[frozenset[str]] = ports("frames", "detections", "tap", "amplitude", "noise", "first_path")
     produces: ClassVar[frozenset[str]] = ports("score_db")
+    implied: ClassVar[bool] = True
     rowwise: ClassVar[bool] = True
     fidelity = "from-source"
 

@@ -75,6 +75,14 @@ class Azimuth(Stage[AzimuthParams]):
     rowwise = True
     fidelity = "from-source"
 
+    def recalibrated(self, column: str, offset: float) -> dict[str, float]:
+        """A bias of ``offset`` radians more."""
+        if column != "azimuth_rad":
+            return {}
+        if self.params.bias_domain != "theta":
+            raise ConfigError("bias_domain: an offset of the azimuth can be set in the domain 'theta' alone")
+        return {"bias_deg": self.params.bias_deg + float(np.rad2deg(offset))}
+
     def open(self, radar: Radar) -> None:
         """Find the antenna spacing where the formula asks for it."""
         super().open(radar)

@@ -68,6 +68,7 @@ class Range(Stage[RangeParams]):
     consumes = ports("frames", "first_path", "detections", "tap")
     produces = ports("delay_s", "range_m")
     rowwise = True
+    implied = True
     fidelity = "from-source"
 
     def open(self, radar: Radar) -> None:
@@ -87,6 +88,16 @@ class Range(Stage[RangeParams]):
     def speed_ratio(self) -> float:
         """Speed that is assumed, over the speed of light."""
         return 1.0 if self.params.speed_of_light == "exact" else ROUNDED_SPEED_M_S / SPEED_OF_LIGHT_M_S
+
+    def recalibrated(self, column: str, offset: float) -> dict[str, float]:
+        """A bias of ``offset`` metres more."""
+        if column != "range_m":
+            return {}
+        if isinstance(self.params.bias_m, str):
+            raise ConfigError(
+                f"bias_m: a measured offset can be added to a number, not to the preset '{self.params.bias_m}'"
+            )
+        return {"bias_m": self.params.bias_m + offset}
 
     def step(self, block: Block) -> Block:
         """Block whose detections carry ``delay_s`` and ``range_m``."""

@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.fixtures.chance import SIGMAS
 from uwbbench.api import Capture, magnitude
 from uwbbench.detect.pipeline import detector_from_yaml
 from uwbbench_datasets.simulator.engine import simulate
@@ -116,14 +117,17 @@ def test_noise_has_its_level_and_its_spectrum(capture, kind: str) -> None:
     crest = np.abs(made.preamble[:, 7]).mean()
     noise = made.preamble[:, 25:]
     level = np.sqrt(np.mean(magnitude(noise) ** 2))
-    assert 20 * np.log10(crest / level) == pytest.approx(30, abs=0.15)
+    # Correlated over taps, its power is as sure as that of 1 / 1.75 independent samples: to 0.6 %, or 0.026 dB. The
+    # modulus of a mean product of independent ones exceeds 0.03 in exp(-0.03^2 * samples / 1.75) of the draws, 2e-11.
+    assert noise.size > 48_000
+    assert 20 * np.log10(crest / level) == pytest.approx(30, abs=0.2)
     sts = np.sqrt(np.mean(magnitude(made.sts1[:, 25:]) ** 2))
-    assert 20 * np.log10(sts / level) == pytest.approx(5, abs=0.15)
+    assert 20 * np.log10(sts / level) == pytest.approx(5, abs=0.25)
     for lag in (1, 2, 3):
         found = np.mean(noise[:, lag:] * np.conj(noise[:, :-lag])) / level**2
         pulse = RaisedCosinePulse()(np.array([lag * made.radar.sample_interval_s]))[0]
-        assert abs(found - (pulse if kind == "rc" else 0.0)) < 0.02
-    assert abs(np.mean(noise * made.sts1[:, 25:].conj())) < 0.02 * level * sts
+        assert abs(found - (pulse if kind == "rc" else 0.0)) < 0.03
+    assert abs(np.mean(noise * made.sts1[:, 25:].conj())) < 0.03 * level * sts
 
 
 def test_ringing_decays_and_stays_the_same_through_a_run(capture) -> None:
@@ -139,16 +143,16 @@ def test_ringing_decays_and_stays_the_same_through_a_run(capture) -> None:
 
 def test_the_mean_power_of_ringing_is_its_profile(capture) -> None:
     params = {"returns": 1, "start_ns": 2.0, "drift": 0.0}
+    short = {"trajectory.duration_s": 0.01, "radar.sts": False}
+    bare = capture(**short).preamble[0]
     power = []
     for seed in range(300):
-        made = capture(
-            {"use": "ringing", "params": params}, seed=seed, **{"trajectory.duration_s": 0.01, "radar.sts": False}
-        )
-        alone = made.preamble[0] - capture(**{"trajectory.duration_s": 0.01, "radar.sts": False}).preamble[0]
-        power.append(np.abs(alone).max() ** 2)
-    direct = np.abs(capture().preamble[0]).max() ** 2
+        made = capture({"use": "ringing", "params": params}, seed=seed, **short)
+        power.append(np.abs(made.preamble[0] - bare).max() ** 2)
+    direct = np.abs(bare).max() ** 2
     expected = 10**-0.9 * np.exp(-2 / 1.5)
-    assert np.mean(power) / direct == pytest.approx(expected, rel=0.2)
+    # Exponential powers spread by their mean; the crest between two taps loses up to 8 %.
+    assert np.mean(power) / direct == pytest.approx(expected, rel=SIGMAS / np.sqrt(300) + 0.08)
 
 
 def test_the_grid_moves_and_the_first_path_is_reported_in_64ths(capture) -> None:
@@ -161,15 +165,15 @@ def test_the_grid_moves_and_the_first_path_is_reported_in_64ths(capture) -> None
     crest = 7 + (left - right) / (4 * curvature)  # the logarithm of a Gaussian is a parabola
     assert -0.5 <= (crest - 7).min() < -0.45
     assert 0.45 < (crest - 7).max() <= 0.5
-    assert np.std(reported - crest) == pytest.approx(0.1, rel=0.1)
+    assert np.std(reported - crest) == pytest.approx(0.1, rel=SIGMAS / np.sqrt(2 * len(crest)))
 
 
 def test_gain_and_phase_are_common_to_a_frame(capture) -> None:
     made, plain = capture({"use": "frame_gain"}), capture()
     factor = made.preamble[:, 7] / plain.preamble[:, 7]
     assert np.allclose(made.sts2[:], factor[:, None] * plain.sts2[:], rtol=1e-5, atol=1e-9)
-    assert np.std(20 * np.log10(np.abs(factor))) == pytest.approx(0.5, rel=0.1)
-    assert abs(np.mean(factor / np.abs(factor))) < 0.1
+    assert np.std(20 * np.log10(np.abs(factor))) == pytest.approx(0.5, rel=SIGMAS / np.sqrt(2 * len(factor)))
+    assert abs(np.mean(factor / np.abs(factor))) < SIGMAS / np.sqrt(len(factor))
     locked = capture({"use": "frame_gain", "params": {"phase": "locked"}}).preamble[:, 7] / plain.preamble[:, 7]
     assert np.allclose(np.angle(locked), 0, atol=1e-6)
 

@@ -3,6 +3,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tests.fixtures.chance import SIGMAS
 from uwbbench.api import SPEED_OF_LIGHT_M_S
 from uwbbench_datasets.simulator.materials import reflection
 from uwbbench_datasets.simulator.shapes import faces
@@ -107,8 +108,8 @@ def test_clutter_has_the_density_and_cross_section_asked_for(make_view, make_ter
     term = make_term("clutter.wall", per_m2=2.0, rcs_m2=1e-3, depth_m=0.2)
     term.prepare(make_view([[0.0, 0.0]], [wide]), np.random.default_rng(4))
     _, _, place, root = term._scatterers[0]
-    assert len(place) == pytest.approx(2000, abs=4 * np.sqrt(2000))
-    assert np.mean(np.abs(root) ** 2) == pytest.approx(1e-3, rel=0.1)
+    assert len(place) == pytest.approx(2000, abs=SIGMAS * np.sqrt(2000))
+    assert np.mean(np.abs(root) ** 2) == pytest.approx(1e-3, rel=SIGMAS / np.sqrt(len(place)))
     assert np.all((place[:, 0] >= 2.8) & (place[:, 0] <= 3.0))
     assert np.all(np.abs(place[:, 1]) <= 50)
     assert np.std(place[:, 2]) == pytest.approx(10 / np.sqrt(12), rel=0.1)

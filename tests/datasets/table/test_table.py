@@ -308,7 +308,7 @@ def test_receivers_in_a_column_become_captures_with_their_own_mounts(tmp_path, o
     assert dataset.open("run/2").radar.mount_yaw_rad == pytest.approx(np.pi)
     np.testing.assert_array_equal(dataset.open("run/2").preamble, original.preamble)
     del mapping["receivers"][2]
-    with pytest.raises(CaptureError, match="receivers: nothing said of '2'"):
+    with pytest.raises(CaptureError, match="receivers: no entry for '2'"):
         opened(tmp_path, mapping, files=["run.csv"]).open("run/2")
 
 

@@ -160,7 +160,7 @@ def test_no_points_have_no_labels():
 def test_points_that_cannot_be_told_apart_are_refused_and_leave_the_others(coordinate):
     clusters = IncrementalDbscan(1.0, 1)
     clusters.insert(np.zeros((1, 2)))
-    with pytest.raises(ValueError, match="too far to tell neighbours within 1"):
+    with pytest.raises(ValueError, match="too far to resolve neighbours within 1"):
         clusters.insert(np.array([[0.0, coordinate]]))
     assert clusters.labels().tolist() == [0]
 

@@ -133,7 +133,7 @@ def test_a_position_too_far_to_tell_neighbours_stops_the_detector_with_its_reaso
     stage = make_stage("dbscan", every=1)
     stage.open(make_radar())
     block = make_block(np.ones((2, 4)), detections=Detections([0, 1], x_m=[0.0, 1e200], y_m=[0.0, 0.0]))
-    with pytest.raises(ValueError, match="too far to tell neighbours"):
+    with pytest.raises(ValueError, match="too far to resolve neighbours"):
         stage.step(block)
 
 

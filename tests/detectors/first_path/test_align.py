@@ -49,7 +49,7 @@ def test_static_frames_with_random_phase_become_coherent(make_radar, make_block,
     rng = np.random.default_rng(0)
     turned = np.exp(2j * np.pi * rng.uniform(size=(100, 1))) * _scene(rng.uniform(6.5, 7.5, 100))
     aligned = run_stage(make_stage("align"), make_radar(), make_block(turned)).frames.preamble
-    assert np.abs(turned.mean(axis=0)).max() < 0.3
+    assert np.abs(turned.mean(axis=0)).max() < 0.5  # a mean of 100 phases exceeds it in exp(-25) of the draws
     assert np.abs(aligned - aligned.mean(axis=0)).max() < 2e-3
 
 
@@ -78,7 +78,7 @@ def test_frames_with_a_weak_direct_path_are_refused_with_a_note(
     noise_taps, make_radar, make_block, make_stage, run_stage
 ):
     rng = np.random.default_rng(0)
-    noise = (rng.normal(size=(2, 50)) + 1j * rng.normal(size=(2, 50))) / np.sqrt(2)
+    noise = np.exp(2j * np.pi * rng.uniform(size=(2, 50)))
     samples = noise + np.array([[1000.0], [3.0]]) * _pulse([7, 7])
     stage = make_stage("align")
     aligned = run_stage(stage, make_radar(noise_taps=noise_taps), make_block(samples)).frames

@@ -5,7 +5,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydantic import ValidationError
+from scipy.special import polygamma
 
+from tests.fixtures.chance import SIGMAS
 from uwbbench.api import ConfigError
 from uwbbench_detectors.peaks.noise import rms
 
@@ -64,11 +66,14 @@ def test_tail_is_the_rms_of_the_last_taps(noise_of):
 
 def test_four_taps_of_white_noise_spread_by_2_3_db(noise_of):
     level_db = 20 * np.log10(noise_of(_white(20_000), method="leading"))
-    assert level_db.std() == pytest.approx(2.3, abs=0.05)
+    spread_db = 10 / np.log(10) * np.sqrt(polygamma(1, 4))  # of the logarithm of a sum of four exponential powers
+    assert spread_db == pytest.approx(2.3, abs=0.05)
+    fourth = np.mean(((level_db - level_db.mean()) / spread_db) ** 4)
+    assert level_db.std() == pytest.approx(spread_db, rel=SIGMAS * np.sqrt((fourth - 1) / (4 * 20_000)))
 
 
 def test_running_median_is_steadier_than_the_level_it_comes_from(noise_of):
-    samples = _white(2000)
+    samples = _white(20_000)  # some 200 windows: 20 % of the steady level's spread are 4 %, and 10 times that is left
     single, steady = (20 * np.log10(noise_of(samples, method=m)) for m in ("leading", "running_median"))
     assert steady[100:].std() < single[100:].std() / 4
 
@@ -94,9 +99,10 @@ def test_invalid_and_empty_frames_leave_no_trace_in_the_running_median(noise_of,
 
 
 def test_median_gives_the_rms_of_white_noise(noise_of):
-    assert noise_of(_white(20, taps=50, sigma=3.0), method="median") == pytest.approx(3.0, rel=0.5)
-    level = noise_of(_white(4000, sigma=3.0), method="median")
-    assert level.mean() == pytest.approx(3.0, rel=0.01)
+    level = noise_of(_white(4000, taps=50, sigma=3.0), method="median")
+    # The median of n Rayleigh magnitudes has the relative standard error 1 / (2 ln 2 sqrt(n)).
+    assert level.std() / 3.0 == pytest.approx(1 / (2 * np.log(2) * np.sqrt(50)), rel=0.1)
+    assert level.mean() == pytest.approx(3.0, rel=0.02)
 
 
 def test_median_hardly_notices_echoes_in_a_few_taps(noise_of):
@@ -158,9 +164,9 @@ def test_featureless_frames_give_a_finite_level(params, samples, noise_of):
 
 
 def _leaking(frames, share):
-    """White noise whose first taps are ten times stronger in this share of the frames."""
+    """White noise whose first taps are a thousand times stronger in this share of the frames."""
     samples = _white(frames, taps=200)
-    samples[: int(share * frames), :4] *= 10
+    samples[: int(share * frames), :4] *= 1000
     return samples
 
 

@@ -1,12 +1,14 @@
 """Compiled code that appears during a measurement."""
 
+from collections.abc import Callable
+
 import numba
 import pytest
 
 from uwbbench.measure.latency.compilations import Compilations, undisturbed
 
 
-def fresh_kernel() -> numba.core.dispatcher.Dispatcher:
+def fresh_kernel() -> Callable[[float], float]:
     @numba.njit
     def doubled(value):  # type: ignore[no-untyped-def]
         return value + value

@@ -9,13 +9,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.fixtures.chance import seed
 from uwbbench.api import Trajectory, write_capture
 from uwbbench.config.detector import detector_from_text, read_detector
 from uwbbench.config.source import CaptureRef
 from uwbbench.measure.latency import LatencyError, launch, measure
 from uwbbench.measure.latency.settings import LatencyModel
 
-REF = CaptureRef("approach", {"speed_m_s": 3.0}, (), "approach-ch9-metal-1")
+REF = CaptureRef("approach", {"speed_m_s": 3.0, "seed": seed()}, (), "approach-ch9-metal-1")
 
 
 def test_a_measurement_is_complete_and_consistent() -> None:

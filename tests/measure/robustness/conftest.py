@@ -4,8 +4,9 @@ from collections.abc import Callable
 
 import pytest
 
+from uwbbench.api.case import CheckResult
 from uwbbench.detect.pipeline import Pipeline, detector_from_yaml
-from uwbbench.measure.robustness import Outcome, case_named
+from uwbbench.measure.robustness import case_named
 from uwbbench.measure.robustness.subject import Subject
 
 RARE = {
@@ -87,8 +88,8 @@ def rare_detectors() -> dict[str, Pipeline]:
 
 
 @pytest.fixture
-def judged() -> Callable[[str, Pipeline], Outcome]:
-    """Outcome of one case, by name."""
+def judged() -> Callable[[str, Pipeline], CheckResult]:
+    """Result of one case, by name."""
     return lambda name, pipeline: case_named(name).judge(Subject(pipeline))
 
 

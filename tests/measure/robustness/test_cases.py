@@ -19,7 +19,7 @@ RANGE = "{use: range}"
 @pytest.mark.parametrize("name", sorted(shipped("detectors")))
 def test_a_shipped_detector_stands_every_case(name):
     found = examine(load_detector(name))
-    assert [(one.case, one.detail) for one in found.outcomes if one.status == "failed"] == []
+    assert [(one.check.name, one.found) for one in found.results if one.status == "failed"] == []
     assert (found.largest_error_m or 0.0) <= 1e-9
     assert found.usual_hits >= (0.0 if name in ("null", "constant") else 0.85)
 
@@ -29,7 +29,7 @@ def test_a_shipped_detector_stands_every_case(name):
 )
 def test_a_detector_of_rarer_stages_stands_every_case(rare_detectors, name):
     found = examine(rare_detectors[name])
-    assert [(one.case, one.detail) for one in found.outcomes if one.status == "failed"] == []
+    assert [(one.check.name, one.found) for one in found.results if one.status == "failed"] == []
 
 
 @pytest.mark.parametrize("case", all_cases(), ids=lambda case: case.name)
@@ -108,7 +108,7 @@ def test_cases_have_names_of_their_own_and_say_what_they_expect():
 def test_a_fault_is_found(faulty, make_detector, judged, case, says, steps):
     outcome = judged(case, make_detector(*steps))
     assert outcome.status == "failed"
-    assert re.search(says, outcome.detail), outcome.detail
+    assert re.search(says, outcome.found), outcome.found
 
 
 def test_a_stage_that_raises_fails_the_case_and_no_other(install_plugin, make_detector):
@@ -126,6 +126,6 @@ class Fragile(Stage[Params]):
 """
     install_plugin("fragile", {"stages": {"fragile": "uwbbench_fragile:Fragile"}}, {"uwbbench_fragile.py": source})
     cases = [case_named("one-frame-capture"), case_named("zero-capture")]
-    one, other = examine(make_detector("{use: fragile}"), cases).outcomes
-    assert (one.status, one.detail) == ("failed", "ValueError: one frame is not enough")
+    one, other = examine(make_detector("{use: fragile}"), cases).results
+    assert (one.status, one.found) == ("failed", "ValueError: one frame is not enough")
     assert other.status == "passed"

@@ -9,15 +9,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from sklearn.cluster import DBSCAN
 
-from uwbbench.api import Detections, magnitude
+from uwbbench.api import Detections, Violation, exact_ulps, magnitude
 from uwbbench.api.geometry import bistatic_range, bistatic_range_sine
 from uwbbench.measure.robustness import case_named
-from uwbbench.measure.robustness.case import Violation
-from uwbbench.measure.robustness.clustering import textbook_clusters
-from uwbbench.measure.robustness.compare import exact_ulps, flipped_share, hit_share, in_frames, still_found, unchanged
-from uwbbench.measure.robustness.geometry import EXCESS_M, _range_m
+from uwbbench.measure.robustness.compare import flipped_share, hit_share, in_frames, still_found, unchanged
 from uwbbench.measure.robustness.scene import RADAR, STEP_M, altered, approach, chosen
 from uwbbench_detectors.clutter.svd import dominant_shapes
+from uwbbench_detectors.hard_cases.clustering import textbook_clusters
+from uwbbench_detectors.hard_cases.geometry import EXCESS_M, _range_m
 
 
 def ranges(frames: list[int], range_m: list[float], **columns: list[float]) -> Detections:

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.fixtures.chance import reseeded
 from uwbbench.api import StoreError
 from uwbbench.measure.accuracy.metrics.detection import Recall
 from uwbbench.measure.accuracy.scoring import ScoringRules, outcomes
@@ -37,7 +38,7 @@ Make = Callable[..., RunFolder]
 def make(tmp_path_factory: pytest.TempPathFactory) -> Make:
     def made(prominence: float = 0.05, material: str = "plywood") -> RunFolder:
         folder = tmp_path_factory.mktemp("compare")
-        (folder / "small.yaml").write_text(EXPERIMENT.format(prominence=prominence, material=material))
+        (folder / "small.yaml").write_text(reseeded(EXPERIMENT.format(prominence=prominence, material=material)))
         return run_experiment(read_experiment(folder / "small.yaml"), folder / "run", jobs=1)
 
     return made

@@ -4,6 +4,7 @@ import sys
 import pytest
 
 from uwbbench.api import Obstacle, StoreError, Truth, UwbbenchError
+from uwbbench.api.text import printable
 from uwbbench.detect.pipeline import load_detector
 from uwbbench.show.figures import style
 from uwbbench.show.figures.radargram import draw_radargram
@@ -24,7 +25,7 @@ def test_hostile_names_are_drawn_as_they_are(approach, name, suffix, tmp_path):
     if suffix == "svg":
         from html import unescape
 
-        assert unescape(path.read_text("utf-8")).count(style.plain(name).strip("_")) >= 2
+        assert unescape(path.read_text("utf-8")).count(printable(name).strip("_")) >= 2
 
 
 def test_a_label_that_starts_with_an_underscore_is_in_the_legend(look):

@@ -4,7 +4,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from uwbbench.show.text.sheet import LONGEST_NAME, Sheet, escaped, interval, number, shown
+from uwbbench.show.text.numbers import interval, number
+from uwbbench.show.text.sheet import LONGEST_NAME, Sheet, escaped, shown
 
 
 @pytest.mark.parametrize(

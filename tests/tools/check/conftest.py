@@ -4,7 +4,8 @@ from collections.abc import Callable
 
 import pytest
 
-from uwbbench.tools.check import Conformance, Result, examine, subject_of
+from uwbbench.api.case import CheckResult
+from uwbbench.tools.check import Conformance, examine, subject_of
 
 Examine = Callable[..., Conformance]
 
@@ -21,10 +22,10 @@ def examine_plugin(install_plugin) -> Examine:
 
 
 @pytest.fixture
-def judged(examine_plugin) -> Callable[..., Result]:
+def judged(examine_plugin) -> Callable[..., CheckResult]:
     """Result of one check of one broken plugin."""
 
-    def run(kind: str, source: str, check: str, **params: object) -> Result:
+    def run(kind: str, source: str, check: str, **params: object) -> CheckResult:
         (result,) = examine_plugin(kind, source, check, **params).results
         return result
 

@@ -43,6 +43,7 @@ RESAMPLED = '''
 BROKEN = {
     "docstring-says-what-it-is": (("Mean absolute error.", "Mean absolute error"), "'Mean absolute error'"),
     "attributes-are-valid": (('better = "lower"', 'better = "less"'), "'less'"),
+    "display-is-valid": (('unit = "m"', 'unit = "m"\n    shown_as = ("cm", 100)'), "('cm', 100)"),
     "unit-is-given": (('unit = "m"', 'unit = ""'), "unit = ''"),
     "partials-are-flat-arrays": (("len(error_m)])", "len(error_m)], dtype=np.float32)"), "float32"),
     "value-is-a-float": (("float(partial[0] / partial[1])", "partial[0] / partial[1]"), "float64"),

@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 import waiting
 
+from tests.fixtures.chance import seed
 from uwbbench.api import registry, write_capture
 from uwbbench.config.source import open_dataset
 
@@ -13,7 +14,7 @@ from uwbbench.config.source import open_dataset
 @pytest.fixture(scope="session")
 def capture_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A simulated capture of some seconds."""
-    dataset = open_dataset("approach", {"speed_m_s": 0.25}, [])
+    dataset = open_dataset("approach", {"speed_m_s": 0.25, "seed": seed()}, [])
     path = tmp_path_factory.mktemp("capture") / "run.h5"
     write_capture(path, dataset.open(dataset.names()[0]))
     return path

@@ -8,27 +8,31 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from uwbbench.tools.gate.check import Check, Result, Verdict
+from uwbbench.tools.gate.check import Check, GateResult, GateVerdict
 from uwbbench.tools.gate.publish import junit, markdown
 
 HOSTILE = "<script>alert('&\"')</script> | `x` [a](http://b) *\x1b[31m\x00\ud800\n## title\r\n]]>"
 
 
-def result(*verdicts: Verdict, text: str = "plate") -> Result:
+def result(*verdicts: GateVerdict, text: str = "plate") -> GateResult:
     checks = [
         Check(kind="latency", name=f"{text} {number}", verdict=verdict, reason=text, advice=text, elapsed_s=1.5)
         for number, verdict in enumerate(verdicts)
     ]
-    return Result(text, text, text, checks, {"cpu": text})
+    return GateResult(text, text, text, checks, {"cpu": text})
 
 
 @pytest.mark.parametrize(
     ("verdicts", "gravest", "code"),
     [
-        ((), Verdict.PASS, 0),
-        ((Verdict.PASS, Verdict.REGRESSION, Verdict.INVALID, Verdict.INCONCLUSIVE), Verdict.REGRESSION, 1),
-        ((Verdict.PASS, Verdict.INCONCLUSIVE), Verdict.INCONCLUSIVE, 2),
-        ((Verdict.INCONCLUSIVE, Verdict.INVALID), Verdict.INVALID, 3),
+        ((), GateVerdict.PASS, 0),
+        (
+            (GateVerdict.PASS, GateVerdict.REGRESSION, GateVerdict.INVALID, GateVerdict.INCONCLUSIVE),
+            GateVerdict.REGRESSION,
+            1,
+        ),
+        ((GateVerdict.PASS, GateVerdict.INCONCLUSIVE), GateVerdict.INCONCLUSIVE, 2),
+        ((GateVerdict.INCONCLUSIVE, GateVerdict.INVALID), GateVerdict.INVALID, 3),
     ],
 )
 def test_the_gravest_verdict_is_the_gates_and_has_its_own_exit_code(verdicts, gravest, code) -> None:
@@ -81,20 +85,20 @@ def assert_junit(root: ET.Element) -> None:
         assert all(suite.get(name) for name in ("package", "name", "hostname"))
 
 
-@given(st.lists(st.sampled_from(Verdict), max_size=6), st.text())
+@given(st.lists(st.sampled_from(GateVerdict), max_size=6), st.text())
 def test_junit_keeps_to_the_common_schemas(verdicts, name: str) -> None:
     assert_junit(ET.fromstring(junit(result(*verdicts, text=f"a{name}"))))  # noqa: S314 - our own text
 
 
 def test_each_verdict_has_its_outcome_in_junit_and_only_a_pass_is_green() -> None:
-    root = ET.fromstring(junit(result(*Verdict)))  # noqa: S314
+    root = ET.fromstring(junit(result(*GateVerdict)))  # noqa: S314
     found = [[(child.tag, child.get("type")) for child in case] for case in root.iter("testcase")]
     assert found == [[], [("failure", "regression")], [("error", "inconclusive")], [("error", "invalid")]]
     assert float(root[0].get("time")) == 6.0
 
 
 def test_hostile_names_are_shown_as_they_are_in_xml_and_break_nothing() -> None:
-    root = ET.fromstring(junit(result(Verdict.REGRESSION, Verdict.INVALID, text=HOSTILE)))  # noqa: S314
+    root = ET.fromstring(junit(result(GateVerdict.REGRESSION, GateVerdict.INVALID, text=HOSTILE)))  # noqa: S314
     (suite,) = root
     assert len(suite.findall("testcase")) == 2
     name = suite.find("testcase").get("name")
@@ -103,7 +107,7 @@ def test_hostile_names_are_shown_as_they_are_in_xml_and_break_nothing() -> None:
 
 
 def test_hostile_names_stay_in_their_cell_of_the_summary() -> None:
-    text = markdown(result(Verdict.REGRESSION, text=HOSTILE))
+    text = markdown(result(GateVerdict.REGRESSION, text=HOSTILE))
     assert "<" not in text
     assert "\x1b" not in text
     assert [line for line in text.splitlines() if line.startswith("#")] == [text.splitlines()[0]]
@@ -114,7 +118,7 @@ def test_hostile_names_stay_in_their_cell_of_the_summary() -> None:
 
 @given(st.text())
 def test_any_name_makes_xml_that_can_be_read_and_a_summary_of_one_table(name: str) -> None:
-    found = result(Verdict.REGRESSION, text=f"a{name}")
+    found = result(GateVerdict.REGRESSION, text=f"a{name}")
     assert len(ET.fromstring(junit(found)).findall(".//failure")) == 1  # noqa: S314
     markdown(found).encode()
     assert sum(line.startswith("| ---") for line in markdown(found).splitlines()) == 1
@@ -122,10 +126,10 @@ def test_any_name_makes_xml_that_can_be_read_and_a_summary_of_one_table(name: st
 
 def test_numbers_are_for_people_in_text_and_si_in_json() -> None:
     check = Check(
-        kind="accuracy", name="MAE", verdict=Verdict.PASS, quantity="MAE", value=0.0312, low=0.03, high=0.04, n=12,
+        kind="accuracy", name="MAE", verdict=GateVerdict.PASS, quantity="MAE", value=0.0312, low=0.03, high=0.04, n=12,
         counted="errors", unit="m", limit=0.05,
     )  # fmt: skip
     assert check.measured_text == "MAE 3.12 cm [3.00 cm, 4.00 cm], 12 errors"
     assert check.limit_text == "<= 5.00 cm"
-    (told,) = Result("g", "h", "", [check], {"cpu": ""}).to_dict()["checks"]
+    (told,) = GateResult("g", "h", "", [check], {"cpu": ""}).to_dict()["checks"]
     assert (told["value"], told["limit"], told["verdict"]) == (0.0312, 0.05, "pass")

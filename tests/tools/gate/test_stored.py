@@ -7,6 +7,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
+from tests.fixtures.chance import seed
 from uwbbench.api import UwbbenchError
 from uwbbench.config.source import open_dataset
 from uwbbench.run import run_experiment
@@ -21,14 +22,14 @@ def run(tmp_path) -> Path:
     file = tmp_path / "small.yaml"
     file.write_text(
         "schema: 1\ndetectors: [paper-filtering, oracle]\nlatency: false\nstability: false\n"
-        "datasets: [{use: approach, params: {speed_m_s: 3.0}}]\n"
+        f"datasets: [{{use: approach, params: {{speed_m_s: 3.0, seed: {seed()}}}}}]\n"
     )
     return run_experiment(read_experiment(file), tmp_path / "run", jobs=1).path
 
 
 @pytest.fixture
 def sha256() -> str:
-    dataset = open_dataset("approach", {"speed_m_s": 3.0}, [])
+    dataset = open_dataset("approach", {"speed_m_s": 3.0, "seed": seed()}, [])
     return dataset.open(dataset.names()[0]).sha256
 
 

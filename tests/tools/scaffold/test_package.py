@@ -9,7 +9,8 @@ from pathlib import Path
 import pytest
 
 from uwbbench.api import ConfigError, StoreError
-from uwbbench.tools.scaffold import KINDS, PluginName, write_package
+from uwbbench.api.registry import AUTHORED_KINDS
+from uwbbench.tools.scaffold import PluginName, write_package
 
 WORDS = {"stage": "clutter.my-own", "detector": "my-detector", "dataset": "my.data", "metric": "rmse2"}
 
@@ -23,7 +24,7 @@ def installed(package: Path, site: Path) -> dict[str, str]:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", AUTHORED_KINDS)
 def test_a_new_package_installs_and_its_own_tests_pass(kind, tmp_path):
     package = write_package(kind, WORDS[kind], tmp_path)
     environment = installed(package, tmp_path / "site")
@@ -43,7 +44,7 @@ def test_an_installed_package_is_listed_and_checked_by_name(tmp_path):
         assert expected in done.stdout
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", AUTHORED_KINDS)
 def test_a_new_package_is_small_and_clean(kind, tmp_path):
     package = write_package(kind, WORDS[kind], tmp_path)
     ruff = Path(sys.executable).with_name("ruff")

@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 import yaml
 
+from tests.fixtures import chance
 from uwbbench.tools.tune import Tuning, read_tuning
 
 PROMINENCE = "pipeline.filter.prominence.params.minimum"
@@ -15,7 +16,7 @@ SCORE = "pipeline.filter.snr.params.minimum_db"
 
 def _approach(material: str, seed: int, **params: object) -> dict[str, object]:
     """One short approach; other seeds are other recordings."""
-    given = {"material": material, "seed": seed, "frame_rate_hz": 8.0, "sts": False, **params}
+    given = {"material": material, "seed": chance.seed(seed), "frame_rate_hz": 8.0, "sts": False, **params}
     return {"use": "approach", "name": f"{material}, seed {seed}, {params}", "params": given}
 
 

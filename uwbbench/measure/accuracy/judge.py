@@ -29,7 +29,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import Literal, get_args
+from typing import get_args
 
 import numpy as np
 
@@ -40,10 +40,9 @@ from uwbbench.api.errors import ScoringError, nearest
 from uwbbench.api.metric import Outcome
 from uwbbench.api.radar import Radar
 from uwbbench.api.truth import Sight, Truth
+from uwbbench.config.rules import Scoring, Table
 from uwbbench.measure.accuracy.matching import match_frames
 
-Scoring = Literal["frame", "peak", "object"]
-Table = Literal["filtering", "mapping"]
 SCORINGS: tuple[Scoring, ...] = get_args(Scoring)
 
 BLOCK_S = 1.0

@@ -11,14 +11,14 @@ import dataclasses
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from importlib import import_module
 from typing import Any, get_args
 
 from uwbbench.api.capture import CaptureHeader
 from uwbbench.api.detections import Detections
 from uwbbench.api.errors import nearest
 from uwbbench.api.metric import Outcome
-from uwbbench.measure.accuracy.judge import SCORINGS, Region, Scene, Scoring, ScoringRules, Table, Verdict, judge
+from uwbbench.config.rules import Scoring, Table
+from uwbbench.measure.accuracy.judge import SCORINGS, Region, Scene, ScoringRules, Verdict, judge
 from uwbbench.measure.accuracy.metrics.detection import F1, FalseAlarmsPerMinute, Precision, Recall
 from uwbbench.measure.accuracy.metrics.error import (
     Bias,
@@ -121,7 +121,9 @@ class Scores:
         return f"Scores({rules.scoring}, gate {rules.gate_m:g} m: {counts}, F1 {block.f1:.3f}, MAE {block.mae_m:.3f} m)"
 
     def _repr_html_(self) -> str:
-        return str(import_module("uwbbench.show.notebook").scores(self))
+        from uwbbench.show.notebook.scores import scores
+
+        return scores(self)
 
     def __getitem__(self, table: str) -> ScoreBlock | None:
         if table not in get_args(Table):

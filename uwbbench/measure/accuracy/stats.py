@@ -227,14 +227,15 @@ def holm(p_values: ArrayLike) -> FloatArray:
     return adjusted
 
 
-def clopper_pearson(successes: int, trials: int, confidence: float = 0.95) -> tuple[float, float]:
+def clopper_pearson(successes: float, trials: float, confidence: float = 0.95) -> tuple[float, float]:
     """Exact interval of a proportion of independent trials (Clopper and Pearson, Biometrika 26, 1934).
 
-    For counts that are independent, such as false alarms of noise-only cells; not for correlated frames.
+    For trials that are independent; :func:`clustered_proportion` is for those that come in groups.
 
     Parameters
     ----------
-    successes, trials : int
+    successes, trials : float
+        Whole numbers; or effective ones, for which the interval between those of whole numbers is given.
     confidence : float
 
     Returns
@@ -262,6 +263,48 @@ def clopper_pearson(successes: int, trials: int, confidence: float = 0.95) -> tu
     low = float(betaincinv(successes, failures + 1, tail)) if successes else 0.0
     high = float(betaincinv(successes + 1, failures, 1 - tail)) if failures else 1.0
     return low, high
+
+
+def clustered_proportion(successes: IntArray, trials: int, confidence: float = 0.95) -> tuple[float, float]:
+    """Interval of a proportion whose trials come in independent groups and are correlated inside them.
+
+    The exact interval of an effective number of trials: the given number over the design effect, by which correlation
+    raises the variance (Korn and Graubard, Survey Methodology 24, 1998). The effect is taken as the number of
+    successes that a success has in its group, itself included, on average: ``sum(s^2) / sum(s)``. It is never below
+    the ratio of variances and equal to it for rare successes. One more success is counted that shares its group with
+    ``trials`` of them. So a few successes, each alone, do not pass for a proof of independence; and without any
+    success the groups alone are counted, as if all trials of a group ended alike.
+
+    Parameters
+    ----------
+    successes : (groups,) int array
+        Successes of each group.
+    trials : int
+        Trials of each group.
+    confidence : float
+
+    Returns
+    -------
+    low, high : float
+        0...1 where there is no group.
+
+    Raises
+    ------
+    ValueError
+        If there are more successes than trials.
+
+    Examples
+    --------
+    Forty alarms in a thousand frames of twenty cells: each in a frame of its own, or ten in each of four frames.
+
+    >>> apart, together = np.zeros(1000, int), np.zeros(1000, int)
+    >>> apart[:40], together[:4] = 1, 10
+    >>> [tuple(round(end, 4) for end in clustered_proportion(alarms, 20)) for alarms in (apart, together)]
+    [(0.0013, 0.0029), (0.0005, 0.0052)]
+    """
+    total = float(np.sum(successes))
+    effect = (float(np.sum(np.square(successes))) + trials) / (total + 1)
+    return clopper_pearson(total / effect, len(successes) * trials / effect, confidence)
 
 
 def samples_needed(quantile: float, confidence: float = 0.95) -> int:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable
+from contextlib import AbstractContextManager
 from types import TracebackType
-from typing import Any, TypeVar
+from typing import TypeVar
 
 Result = TypeVar("Result")
 
@@ -21,44 +22,26 @@ class Compilations:
 
     def __init__(self) -> None:
         self.count = 0
-        self._listener: Any = None
+        self._watching: AbstractContextManager[None] | None = None
 
     def __enter__(self) -> Compilations:
         if "numba" in sys.modules:
-            self._listener = _listener(self)
-            _events().register(_LOCKED, self._listener)
+            from uwbbench.api.numba_internals import on_compiling
+
+            self._watching = on_compiling(self._notice)
+            self._watching.__enter__()
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        if self._listener is not None:
-            _events().unregister(_LOCKED, self._listener)
+        if self._watching is not None:
+            self._watching.__exit__(kind, error, trace)
         elif "numba" in sys.modules:
-            self.count += 1
+            self._notice()
 
-
-_LOCKED = "numba:compiler_lock"
-"""Event of whoever takes the compiler's lock: to compile a function for new types, or to load what is cached."""
-
-
-def _events() -> Any:
-    import numba.core.event
-
-    return numba.core.event
-
-
-def _listener(watch: Compilations) -> Any:
-    """Listener of numba's events; its base class can only be had once numba is there."""
-
-    class Counting(_events().Listener):  # type: ignore[misc]  # numba is untyped
-        def on_start(self, event: object) -> None:  # noqa: ARG002 - the base class names it
-            watch.count += 1
-
-        def on_end(self, event: object) -> None:
-            pass
-
-    return Counting()
+    def _notice(self) -> None:
+        self.count += 1
 
 
 def undisturbed(measured: Callable[[], Result], tries: int = 3) -> tuple[Result, int]:

@@ -63,7 +63,7 @@ class Latency:
         ``p99_us``, ``mean_us``, ``max_us``); None where it does not tell.
     ratio_to_reference : dict or None
         Time relative to a reference detector over alternating blocks: ``reference``, and what
-        :func:`~uwbbench.measure.latency.pairing.ratio_summary` tells, with ``disturbed_blocks``: in how many of the
+        :func:`~uwbbench.measure.latency.ratio.ratio_summary` tells, with ``disturbed_blocks``: in how many of the
         blocks other processes had the core for a while.
     paced : dict or None
         Frames handed out at a fixed rate (:func:`~uwbbench.measure.latency.paced.paced_summary`); None where not asked

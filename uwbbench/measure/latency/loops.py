@@ -127,7 +127,7 @@ def _chunks(whole: Frames) -> list[list[Frames]]:
 def stream_pass(pipeline: Pipeline, capture: Capture, whole: Frames) -> tuple[FloatArray, BoolArray | None, float]:
     """One frame a call: time of every call, which calls clustered, and the time of the flush, in microseconds."""
     stream, calls = pipeline.open(capture), cut(whole, 1)
-    counters = [stage for stage in stream.stages if hasattr(stage, "clusterings")]
+    counters = [stage for stage in stream.stages if stage.clusterings is not None]
     counts = np.zeros(len(calls) + 1, np.int64)
     times_ns = np.empty(len(calls))
     step = stream.step

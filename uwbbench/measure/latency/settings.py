@@ -4,20 +4,21 @@ from __future__ import annotations
 
 from typing import Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
+
+from uwbbench.api import registry
+from uwbbench.config.model import ConfigModel
 
 
-class LatencyModel(BaseModel):
+class LatencyModel(ConfigModel):
     """How calls are timed."""
-
-    model_config = ConfigDict(extra="forbid", populate_by_name=True, allow_inf_nan=False, frozen=True)
 
     enabled: bool = True
     captures: Literal["first", "all"] = Field(default="first", description="Captures of each dataset that are timed.")
     frames: int = Field(default=2000, ge=1, description="Frames timed at most, from the start of a capture.")
     warmup_windows: int = Field(default=10, ge=2, description="Windows of warm-up at most, if they never agree.")
     reference: str | None = Field(
-        default="paper-filtering",
+        default_factory=lambda: registry.default("detector.reference"),
         description="Detector that each one is compared with, in alternating blocks; null: none.",
     )
     blocks: int = Field(default=100, ge=8, description="Alternating blocks at least; more give a narrower interval.")

@@ -51,6 +51,7 @@ def _pin() -> int | None:
 
 
 def _measured(spec: dict[str, Any], core: int | None) -> dict[str, Any]:
+    from uwbbench.api import registry
     from uwbbench.api.errors import CaptureError
     from uwbbench.config.source import CaptureRef
     from uwbbench.measure.latency import loops, memory
@@ -85,7 +86,7 @@ def _measured(spec: dict[str, Any], core: int | None) -> dict[str, Any]:
     if compilations:
         notes.append("code was compiled during the timed passes: some times hold that of the compiler")
     instructions, instructions_note = _instructions(pipeline, capture, whole)
-    null = _pipeline(NULL)
+    null = _pipeline({"schema": 1, "name": "idle", "pipeline": [{"use": registry.default("stage.idle")}]})
     loops.warm_up(null, capture, whole, spec["warmup_windows"])
     overhead_us, _, _ = loops.stream_pass(null, capture, whole)
     growth = memory.growth(pipeline, capture, whole)
@@ -161,16 +162,22 @@ def _ratio(
     pipeline: Pipeline, capture: Capture, whole: Frames, spec: dict[str, Any]
 ) -> tuple[dict[str, Any] | None, int]:
     """Alternating with the reference, where there is one, and how often something was compiled meanwhile."""
-    from uwbbench.measure.latency import loops, pairing
     from uwbbench.measure.latency.compilations import undisturbed
+    from uwbbench.measure.latency.player import Player, in_turns, turn_frames
+    from uwbbench.measure.latency.ratio import ratio_summary
 
     if spec["reference"] is None:
         return None, 0
     reference = _pipeline(spec["reference"])
-    loops.warm_up(reference, capture, whole, spec["warmup_windows"])
-    turns, compilations = undisturbed(lambda: pairing.alternating(pipeline, reference, capture, whole, spec["blocks"]))
-    ratio = pairing.ratio_summary(turns.first_s, turns.second_s)
-    disturbed = int(np.count_nonzero(turns.waited_s))
+    players = [Player(one, capture, whole) for one in (pipeline, reference)]
+    players[1].warm_up(spec["warmup_windows"])
+    size = turn_frames([player.call_s() for player in players])
+    once_through = -(-len(whole) // (2 * size))  # so that all frames count in the ratio of all time together
+    blocks = max(spec["blocks"], once_through)
+    times_s, compilations = undisturbed(lambda: in_turns(players, size, blocks))
+    waited_s = np.reshape([player.waited_s for player in players], (-1, blocks, 2))
+    disturbed = int(np.count_nonzero(waited_s.any(axis=(0, 2))))
+    ratio = ratio_summary(times_s[:, 0], times_s[:, 1])
     return {"reference": reference.name, **ratio, "disturbed_blocks": disturbed}, compilations
 
 
@@ -188,9 +195,6 @@ def _instructions(pipeline: Pipeline, capture: Capture, whole: Frames) -> tuple[
     with loops.quiet():
         count, note = counted(work)
     return None if count is None else count / len(calls), note
-
-
-NULL = {"schema": 1, "name": "null", "pipeline": [{"use": "reference.nothing"}]}
 
 
 def _pipeline(data: dict[str, Any]) -> Pipeline:

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from fractions import Fraction
 
 import numpy as np
 
-from uwbbench.api.arrays import BoolArray, FloatArray, IntArray
+from uwbbench.api.arrays import BoolArray, IntArray
 from uwbbench.api.capture import Capture
+from uwbbench.api.case import Evidence, Violation
 from uwbbench.api.detections import Detections
-from uwbbench.measure.robustness.case import Evidence, Violation
 from uwbbench.measure.robustness.subject import NEAR_M
 
 SAME_M = 0.075
@@ -92,11 +91,3 @@ def still_found(found: Detections, capture: Capture, usual: float, loss: float, 
     if share < usual - loss:
         raise Violation(f"{told}: more than {loss:.0%} lost")
     return told
-
-
-def exact_ulps(found: FloatArray, exact: Sequence[Fraction]) -> float:
-    """Largest distance of computed values from exact ones, in units in the last place of the exact ones."""
-    return max(
-        float(abs(Fraction(float(value)) - truth) / Fraction(float(np.spacing(abs(float(truth))))))
-        for value, truth in zip(found, exact, strict=True)
-    )

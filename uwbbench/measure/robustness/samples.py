@@ -10,12 +10,13 @@ import numpy as np
 
 from uwbbench.api.arrays import ComplexArray
 from uwbbench.api.capture import Capture
+from uwbbench.api.case import Evidence, NotApplicable, Violation, hard_case
 from uwbbench.api.detections import Detections
 from uwbbench.api.frames import magnitude
-from uwbbench.measure.robustness.case import Evidence, NotApplicable, Violation, case
-from uwbbench.measure.robustness.compare import exact_ulps, flipped_share, hit_share, in_frames, still_found, unchanged
-from uwbbench.measure.robustness.scene import FRAMES, NOISE, NOISE_TAPS, TAPS, altered, approach, chosen
-from uwbbench.measure.robustness.subject import Subject, block_of, through
+from uwbbench.api.trial import exact_ulps
+from uwbbench.measure.robustness.compare import flipped_share, hit_share, in_frames, still_found, unchanged
+from uwbbench.measure.robustness.scene import FRAMES, NOISE, NOISE_TAPS, altered, approach, chosen
+from uwbbench.measure.robustness.subject import Subject
 
 DAMAGED = np.array([0, 41, 97, 98, 99, 100, 101, FRAMES - 1])
 """The first frame, one alone, a run, and the last one."""
@@ -41,13 +42,13 @@ def _nothing_there(found: Detections) -> None:
 def _nothing_but(subject: Subject, found: Detections) -> Evidence:
     """The damaged frames yield nothing, and the intact ones what they yield on their own."""
     _nothing_there(found)
-    for step in subject.pipeline.config.steps:
-        if step.use == "clutter.svd" and step.params.get("every", 1) != 1:
-            raise NotApplicable("clutter.svd works on every n-th frame of the capture, which are others without these")
+    for name, stage in subject.stages():
+        if stage.every_nth:
+            raise NotApplicable(f"{name} works on every n-th frame of the capture, which are others without these")
     return unchanged(in_frames(found, INTACT), subject.run(chosen(subject.capture, INTACT)), EXACT_M)
 
 
-@case("reject")
+@hard_case("reject")
 def zero_frames(subject: Subject) -> Evidence:
     """All-zero frames, alone and in a run, yield nothing; the others yield what they do without them.
 
@@ -57,13 +58,13 @@ def zero_frames(subject: Subject) -> Evidence:
     return _nothing_but(subject, subject.run_altered(_damaged(subject.capture, 0.0)))
 
 
-@case("reject")
+@hard_case("reject")
 def zero_capture(subject: Subject) -> Evidence:
     """A capture of zeros alone yields nothing."""
     return _nothing(subject, 0.0)
 
 
-@case("reject")
+@hard_case("reject")
 def constant_frames(subject: Subject) -> Evidence:
     """Frames of one constant, alone and in a run, yield nothing; of other detections one in twenty may come or go.
 
@@ -75,7 +76,7 @@ def constant_frames(subject: Subject) -> Evidence:
     return _hardly_flipped(in_frames(found, INTACT), subject.run(chosen(subject.capture, INTACT)), 0.05)
 
 
-@case("reject")
+@hard_case("reject")
 def constant_capture(subject: Subject) -> Evidence:
     """A capture of one constant alone yields nothing."""
     return _nothing(subject, 0.3 - 0.2j)
@@ -88,7 +89,7 @@ def _nothing(subject: Subject, value: complex) -> Evidence:
     return Evidence("no detections")
 
 
-@case("reject")
+@hard_case("reject")
 def rippled_constant_frames(subject: Subject) -> Evidence:
     """Constant frames with a ripple of one unit in the last place yield nothing.
 
@@ -106,7 +107,7 @@ def rippled_constant_frames(subject: Subject) -> Evidence:
     return Evidence("no detections")
 
 
-@case("survive")
+@hard_case("survive")
 def zero_noise_taps(subject: Subject) -> Evidence:
     """Leading taps that are exactly zero make no score infinite and nothing not a number.
 
@@ -123,27 +124,7 @@ def zero_noise_taps(subject: Subject) -> Evidence:
     return Evidence(f"{len(found)} detections, echo found in {hit_share(found, capture):.0%} of frames")
 
 
-@case("equal")
-def vanishing_noise(subject: Subject) -> Evidence:
-    """Noise of amplitude 5e-23 in single precision, whose square is zero there, is measured to 4 units.
-
-    All samples are equal, so that their root mean square is the magnitude of one of them, and so is their median,
-    which counts for 1 / sqrt(ln 2) of it. In single precision the squares vanish, the noise would be zero and every
-    score infinite.
-    """
-    stage = subject.stage("noise_floor")
-    quiet = np.complex64(3e-23 + 4e-23j)
-    expected = math.hypot(float(quiet.real), float(quiet.imag))
-    if stage.params.method == "median":
-        expected /= math.sqrt(math.log(2))
-    level = float(through(stage, block_of(np.full((1, TAPS), quiet))).part("noise_rms")[0])
-    error_ulp = abs(level - expected) / math.ulp(expected)
-    if not error_ulp <= 4:
-        raise Violation(f"noise of {level:.3g}, expected {expected:.3g}")
-    return Evidence(f"noise of {level:.3g}", error_ulp=error_ulp)
-
-
-@case("survive")
+@hard_case("survive")
 def dc_offset(subject: Subject) -> Evidence:
     """With an offset of half the noise on every sample the echo is found as often, within a tenth of the frames."""
     capture = altered(subject.capture, lambda samples: samples + NOISE / 2 * (1 + 1j) / np.sqrt(2))
@@ -155,7 +136,7 @@ def _clipped(samples: ComplexArray, limit: float) -> ComplexArray:
     return np.asarray(np.clip(samples.real, -limit, limit) + 1j * np.clip(samples.imag, -limit, limit))
 
 
-@case("survive")
+@hard_case("survive")
 def clipped_samples(subject: Subject) -> Evidence:
     """With I and Q clipped at the height of the direct path the echo is found in all but a tenth of the usual frames.
 
@@ -166,7 +147,7 @@ def clipped_samples(subject: Subject) -> Evidence:
     return Evidence(still_found(found, capture, hit_share(subject.usual, subject.capture), 0.10))
 
 
-@case("survive")
+@hard_case("survive")
 def hard_clipped_samples(subject: Subject) -> Evidence:
     """Samples clipped to three tenths of the direct path yield no infinity and no value that is not a number.
 
@@ -178,13 +159,13 @@ def hard_clipped_samples(subject: Subject) -> Evidence:
     return Evidence(f"{len(found)} detections, echo found in {hit_share(found, capture):.0%} of frames")
 
 
-@case("reject")
+@hard_case("reject")
 def nan_samples(subject: Subject) -> Evidence:
     """Frames with one sample that is not a number yield nothing; the others yield what they do without them."""
     return _single_sample(subject, np.nan)
 
 
-@case("reject")
+@hard_case("reject")
 def infinite_samples(subject: Subject) -> Evidence:
     """Frames with one infinite sample yield nothing; the others yield what they do without them."""
     return _single_sample(subject, np.inf)
@@ -196,13 +177,13 @@ def _single_sample(subject: Subject, value: float) -> Evidence:
     return _nothing_but(subject, subject.run(dataclasses.replace(subject.capture, preamble=preamble)))
 
 
-@case("reject")
+@hard_case("reject")
 def nan_frames(subject: Subject) -> Evidence:
     """Frames that are not a number throughout, in all responses, yield nothing and leave no trace."""
     return _nothing_but(subject, subject.run(_damaged(subject.capture, complex(np.nan, -np.inf))))
 
 
-@case("reject")
+@hard_case("reject")
 def nan_capture(subject: Subject) -> Evidence:
     """A capture without one valid frame yields nothing, and processes nothing."""
     found = subject.run(altered(subject.capture, lambda samples: np.full_like(samples, np.nan)))
@@ -211,7 +192,7 @@ def nan_capture(subject: Subject) -> Evidence:
     return Evidence("no detections, no frames processed")
 
 
-@case("survive")
+@hard_case("survive")
 def denormal_capture(subject: Subject) -> Evidence:
     """A capture at 1e-310, below the least normal number, yields no infinity and no value that is not a number.
 
@@ -221,7 +202,7 @@ def denormal_capture(subject: Subject) -> Evidence:
     return Evidence(f"{len(found)} detections")
 
 
-@case("survive")
+@hard_case("survive")
 def denormal_noise(subject: Subject) -> Evidence:
     """Leading taps at the least number there is yield no infinite score, and nothing that is not a number."""
 
@@ -233,7 +214,7 @@ def denormal_noise(subject: Subject) -> Evidence:
     return Evidence(f"{len(found)} detections")
 
 
-@case("equal")
+@hard_case("equal")
 def denormals_kept(subject: Subject) -> Evidence:
     """After a run the process still computes with denormals: half of the least normal number is not zero.
 
@@ -251,13 +232,13 @@ def _scaled(subject: Subject, factor: float) -> Evidence:
     return unchanged(found, subject.usual, EXACT_M)
 
 
-@case("equal")
+@hard_case("equal")
 def amplitudes_times_1e_minus_150(subject: Subject) -> Evidence:
     """Samples times 1e-150 yield the same detections, within 1 nm: no power may underflow."""
     return _scaled(subject, 1e-150)
 
 
-@case("equal")
+@hard_case("equal")
 def amplitudes_times_1e150(subject: Subject) -> Evidence:
     """Samples times 1e150 yield the same detections, within 1 nm: no power may overflow."""
     return _scaled(subject, 1e150)
@@ -271,7 +252,7 @@ def _hardly_flipped(found: Detections, expected: Detections, limit: float) -> Ev
     return Evidence(told, flips=share)
 
 
-@case("equal")
+@hard_case("equal")
 def int16_range(subject: Subject) -> Evidence:
     """I/Q rounded to the range of 16-bit integers yields the same detections but for one in fifty."""
 
@@ -286,13 +267,13 @@ def _stored(samples: ComplexArray) -> ComplexArray:
     return np.asarray(samples, np.complex64)
 
 
-@case("equal")
+@hard_case("equal")
 def single_precision(subject: Subject) -> Evidence:
     """Samples stored as complex64 yield the same detections as complex128, but for one in a hundred."""
     return _hardly_flipped(subject.run_altered(altered(subject.capture, _stored)), subject.usual, 0.01)
 
 
-@case("equal")
+@hard_case("equal")
 def one_ulp_noise(subject: Subject) -> Evidence:
     """Moving every stored number to one of its neighbours changes at most one detection in a hundred.
 
@@ -309,7 +290,7 @@ def one_ulp_noise(subject: Subject) -> Evidence:
     return _hardly_flipped(subject.run(altered(subject.capture, moved)), stored, 0.01)
 
 
-@case("equal")
+@hard_case("equal")
 def magnitudes_of_integers(subject: Subject) -> Evidence:  # noqa: ARG001  (all detectors share the magnitude)
     """Magnitudes of integer I/Q pairs are those of exact arithmetic within half a unit, and equal for equal powers.
 
@@ -335,7 +316,7 @@ def _root(value: int) -> Fraction:
     return Fraction(math.isqrt(value * 10**60), 10**30)
 
 
-@case("survive")
+@hard_case("survive")
 def direct_path_thousandfold(subject: Subject) -> Evidence:
     """A direct path 60 dB above its usual height yields nothing infinite; the echo may be lost beside it.
 

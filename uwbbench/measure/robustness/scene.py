@@ -15,10 +15,11 @@ import numpy as np
 from uwbbench.api.arrays import ComplexArray, FloatArray, IntArray
 from uwbbench.api.capture import Capture
 from uwbbench.api.geometry import SPEED_OF_LIGHT_M_S, excess_path
-from uwbbench.api.radar import Radar
+from uwbbench.api.trial import RADAR
 from uwbbench.api.truth import Obstacle, Trajectory, Truth
 
-FRAMES, TAPS, NOISE_TAPS, CREST_TAP = 160, 50, 4, 7.0
+FRAMES, CREST_TAP = 160, 7.0
+TAPS, NOISE_TAPS = RADAR.taps, RADAR.noise_taps
 PULSE_TAPS = 3.2
 """Width of the Gaussian pulse at half its height."""
 ECHO, NOISE = 0.12, 0.005
@@ -26,21 +27,6 @@ ECHO, NOISE = 0.12, 0.005
 START_M, STEP_M, SIDE_M = 3.2, 0.0125, 0.1
 RINGING = ((1.0, 0.10 + 0.05j), (2.0, -0.03 + 0.04j))
 """Delay in taps and amplitude of what moves along with the robot."""
-
-RADAR = Radar(
-    model="synthetic",
-    center_frequency_hz=7987.2e6,
-    bandwidth_hz=499.2e6,
-    sample_interval_s=1 / (2 * 499.2e6),
-    frame_rate_hz=48.0,
-    taps=TAPS,
-    channel=9,
-    tx_position_m=(0.0, -0.25, 0.0),
-    noise_taps=NOISE_TAPS,
-    array_spacing_m=17.8e-3,
-    has_sts=True,
-    has_first_path=True,
-)
 
 
 def pulse(tap: FloatArray) -> FloatArray:

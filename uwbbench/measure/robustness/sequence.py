@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from uwbbench.api.arrays import ComplexArray, IntArray
+from uwbbench.api.case import Evidence, Violation, hard_case
 from uwbbench.api.errors import CaptureError
-from uwbbench.measure.robustness.case import Evidence, Violation, case
 from uwbbench.measure.robustness.compare import flipped_share, hit_share, in_frames, still_found, unchanged
 from uwbbench.measure.robustness.scene import FRAMES, NOISE, altered, approach, chosen
 from uwbbench.measure.robustness.subject import Subject
@@ -25,20 +25,20 @@ def _survives(subject: Subject, rows: IntArray, timestamp_s: np.ndarray | None =
     return Evidence(still_found(subject.run(capture), capture, _usual_share(subject, rows), LOSS))
 
 
-@case("survive")
+@hard_case("survive")
 def lost_frames(subject: Subject) -> Evidence:
     """With every fifth frame lost, and 20 frames in a row, the echo is found in as large a share of the others."""
     kept = np.array([row for row in range(FRAMES) if row % 5 != 2 and not 70 <= row < 90])
     return _survives(subject, kept)
 
 
-@case("survive")
+@hard_case("survive")
 def duplicated_frames(subject: Subject) -> Evidence:
     """With every fourth frame delivered twice, at the same time, the echo is found in as large a share."""
     return _survives(subject, np.sort(np.concatenate([np.arange(FRAMES), np.arange(0, FRAMES, 4)])))
 
 
-@case("survive")
+@hard_case("survive")
 def reordered_frames(subject: Subject) -> Evidence:
     """With neighbours swapped every ten frames, and times in order, the echo is found in as large a share."""
     rows = np.arange(FRAMES)
@@ -46,7 +46,7 @@ def reordered_frames(subject: Subject) -> Evidence:
     return _survives(subject, rows, subject.capture.trajectory.timestamp_s)
 
 
-@case("reject")
+@hard_case("reject")
 def time_going_backwards(subject: Subject) -> Evidence:
     """A capture whose time goes backwards is refused before any detector sees it, and the frame is named."""
     times = subject.capture.trajectory.timestamp_s.copy()
@@ -60,14 +60,14 @@ def time_going_backwards(subject: Subject) -> Evidence:
     raise Violation("a capture with decreasing times was accepted")
 
 
-@case("equal")
+@hard_case("equal")
 def one_frame_capture(subject: Subject) -> Evidence:
     """A capture of one frame yields what that frame yields at the start of a longer one."""
     first = np.array([0])
     return unchanged(subject.run(chosen(subject.capture, first)), in_frames(subject.usual, first), 0.0)
 
 
-@case("survive")
+@hard_case("survive")
 def no_frames(subject: Subject) -> Evidence:
     """A capture without frames yields nothing."""
     found = subject.run(chosen(subject.capture, np.empty(0, np.int64)))
@@ -79,7 +79,7 @@ def no_frames(subject: Subject) -> Evidence:
 STEP_FRAME, SETTLED = 40, np.arange(130, FRAMES)
 
 
-@case("equal")
+@hard_case("equal")
 def clutter_step(subject: Subject) -> Evidence:
     """90 frames after the clutter has changed at once, the echo is found as often as if it had always been so.
 
@@ -100,7 +100,7 @@ def clutter_step(subject: Subject) -> Evidence:
     return Evidence(still_found(found, stepped, usual, LOSS, SETTLED))
 
 
-@case("survive")
+@hard_case("survive")
 def interference_bursts(subject: Subject) -> Evidence:
     """Three frames flooded 40 dB above the noise, and single samples as strong, leave later frames as they were.
 

@@ -7,12 +7,12 @@ from fractions import Fraction
 
 import numpy as np
 
+from uwbbench.api.case import Evidence, Violation, hard_case
 from uwbbench.measure.accuracy.metrics.error import StandardDeviation
-from uwbbench.measure.robustness.case import Evidence, Violation, case
 from uwbbench.measure.robustness.subject import Subject
 
 
-@case("equal")
+@hard_case("equal")
 def standard_deviation_far_from_zero(subject: Subject) -> Evidence:  # noqa: ARG001  (all detectors share the metric)
     """The spread of errors around 1e8 m is exact to 1e-7, where the difference of two sums of squares has no digit.
 

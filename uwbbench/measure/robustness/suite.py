@@ -4,63 +4,64 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from types import ModuleType
 from typing import Any
 
-from uwbbench.api.errors import ConfigError, nearest
+from uwbbench.api import registry
+from uwbbench.api.case import CheckResult, Examination, HardCase, cases_of, select
+from uwbbench.api.errors import PluginError
 from uwbbench.detect.pipeline import Pipeline
-from uwbbench.measure.robustness import clustering, clutter, geometry, peaks, samples, sequence, spread, thresholds
-from uwbbench.measure.robustness.case import Case, Outcome
+from uwbbench.measure.robustness import peaks, samples, sequence, spread
 from uwbbench.measure.robustness.compare import hit_share
 from uwbbench.measure.robustness.subject import Subject
 
-GROUPS: tuple[ModuleType, ...] = (samples, peaks, thresholds, geometry, clutter, clustering, sequence, spread)
 
+def all_cases() -> tuple[HardCase, ...]:
+    """Every hard case, group by group: those of all detectors, and those that packages bring for their stages.
 
-def all_cases() -> tuple[Case, ...]:
-    """Every hard case, group by group, in the order in which they are written."""
-    return tuple(thing for group in GROUPS for thing in vars(group).values() if isinstance(thing, Case))
+    Raises
+    ------
+    PluginError
+        If what a package brings cannot be loaded, or bears a name that is taken.
+    """
+    brought = [case for name in registry.entries("cases") for case in registry.load_object("cases", name)]
+    cases = [*cases_of(samples, peaks), *brought, *cases_of(sequence, spread)]
+    names = [case.name for case in cases]
+    double = next((name for name in names if names.count(name) > 1), None)
+    if double:
+        raise PluginError(f"two hard cases are named '{double}'; uninstall one of the packages that bring them")
+    groups = list(dict.fromkeys(case.group for case in cases))
+    return tuple(sorted(cases, key=lambda case: groups.index(case.group)))
 
 
 @dataclass(frozen=True)
-class Stability:
-    """How one detector stood the hard cases.
+class Stability(Examination):
+    """How one detector took the hard cases.
 
     Attributes
     ----------
+    results : tuple of CheckResult
     detector : str
     usual_hits : float
         Share of the frames of the undisturbed capture in which it finds the echo; where that is 0, as for a detector
         that never detects, most cases are passed easily.
-    outcomes : tuple of Outcome
     """
 
     detector: str
     usual_hits: float
-    outcomes: tuple[Outcome, ...]
-
-    def count(self, status: str) -> int:
-        """Cases with this status."""
-        return sum(outcome.status == status for outcome in self.outcomes)
-
-    @property
-    def passed(self) -> bool:
-        """Whether no case failed."""
-        return self.count("failed") == 0
 
     @property
     def largest_error_m(self) -> float | None:
         """Largest range error of all passed cases that compare ranges with a reference; None if there are none."""
-        return max((outcome.error_m for outcome in self.outcomes if outcome.error_m is not None), default=None)
+        return max((result.error_m for result in self.results if result.error_m is not None), default=None)
 
     @property
     def largest_error_ulp(self) -> float | None:
         """Largest error, in units in the last place, of all passed cases that compare computed values; or None."""
-        return max((outcome.error_ulp for outcome in self.outcomes if outcome.error_ulp is not None), default=None)
+        return max((result.error_ulp for result in self.results if result.error_ulp is not None), default=None)
 
-    def flips(self, case: Case) -> float | None:
+    def flips(self, case: HardCase) -> float | None:
         """Share of the detections that come or go in one case; None if it was not put to the detector."""
-        return next((outcome.flips for outcome in self.outcomes if outcome.case == case.name), None)
+        return next((result.flips for result in self.results if result.check.name == case.name), None)
 
     def summary(self) -> dict[str, Any]:
         """One row of figures."""
@@ -78,10 +79,17 @@ class Stability:
 
     def to_dict(self) -> dict[str, Any]:
         """Figures and all cases as plain values, for JSON."""
-        return {**self.summary(), "cases": [outcome.to_dict() for outcome in self.outcomes]}
+        return {**self.summary(), "cases": [_row(result) for result in self.results]}
 
 
-def case_named(name: str) -> Case:
+def _row(result: CheckResult) -> dict[str, Any]:
+    about = {key: getattr(result.check, key) for key in ("group", "expectation", "statement")}
+    figures = {key: getattr(result, key) for key in ("error_m", "error_ulp", "flips")}
+    detail = result.detail or result.found
+    return {"case": result.check.name, **about, "status": result.status, "detail": detail, **figures}
+
+
+def case_named(name: str) -> HardCase:
     """Find a hard case by name.
 
     Raises
@@ -89,19 +97,16 @@ def case_named(name: str) -> Case:
     ConfigError
         If there is none of that name.
     """
-    known = {one.name: one for one in all_cases()}
-    if name not in known:
-        raise ConfigError(f"no hard case named '{name}'.{nearest(name, known)}")
-    return known[name]
+    return select(all_cases(), [name], "hard case")[0]
 
 
-def examine(pipeline: Pipeline, cases: Sequence[Case] | None = None) -> Stability:
+def examine(pipeline: Pipeline, cases: Sequence[HardCase] | None = None) -> Stability:
     """Put hard cases to a detector.
 
     Parameters
     ----------
     pipeline : Pipeline
-    cases : sequence of Case, optional
+    cases : sequence of HardCase, optional
         All of them if not given.
 
     Raises
@@ -115,5 +120,5 @@ def examine(pipeline: Pipeline, cases: Sequence[Case] | None = None) -> Stabilit
     return Stability(
         detector=pipeline.name,
         usual_hits=hit_share(subject.usual, subject.capture),
-        outcomes=tuple(one.judge(subject) for one in chosen),
+        results=tuple(one.judge(subject) for one in chosen),
     )

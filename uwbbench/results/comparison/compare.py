@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from uwbbench.api.errors import ConfigError, nearest
+from uwbbench.measure.accuracy.metrics.choice import MetricChoice
 from uwbbench.results.comparison.changes import Change, changes
 from uwbbench.results.comparison.flips import Flip, flips
 from uwbbench.results.comparison.scores import ScoreChange, TimeChange, score_changes, time_changes
@@ -28,6 +29,8 @@ class Comparison:
     first, second : RunFolder
     changes : tuple of Change
         In configuration, code, data and machine.
+    metrics : MetricChoice
+        Those that either run shows.
     scores : tuple of ScoreChange
     times : tuple of TimeChange
     scoring : str
@@ -44,6 +47,7 @@ class Comparison:
     first: RunFolder
     second: RunFolder
     changes: tuple[Change, ...]
+    metrics: MetricChoice
     scores: tuple[ScoreChange, ...]
     times: tuple[TimeChange, ...]
     scoring: str
@@ -119,23 +123,25 @@ def compare(first: RunFolder, second: RunFolder, scoring: str | None = None, mos
     with read_safely(first.path):
         rules = {rule.scoring: rule for rule in first.rules}
         settings = {**first.manifest["experiment"]["intervals"], "seed": first.manifest["experiment"]["seed"]}
+        metrics = MetricChoice([name for one in (first, second) for name in one.manifest["experiment"]["metrics"]])
     if scoring is not None and scoring not in rules:
         raise ConfigError(f"{first.path}: was not scored by '{scoring}'.{nearest(scoring, rules)}")
     rule = next(one for name, one in rules.items() if scoring in (None, name))
     with read_safely(second.path):
         different = changes(first, second)
         units, left_out = shared(first, second)
-        scores, unjudged = score_changes(units, list(rules.values()), settings)
+        scores, unjudged = score_changes(units, list(rules.values()), metrics, settings)
         times, untimed = time_changes(first, second)
         counts, frames, worst = flips(units, rule, most)
     if first.rules != second.rules:
         unjudged.insert(0, "the runs were scored by different rules; both are judged here by those of the first")
     ended = [note for folder in (first, second) for note in _seal(folder)]
-    notes = (*ended, *left_out, *unjudged, *untimed, *first.damage, *second.damage)
+    notes = (*ended, *left_out, *unjudged, *untimed, *metrics.notes, *first.damage, *second.damage)
     return Comparison(
         first=first,
         second=second,
         changes=tuple(different),
+        metrics=metrics,
         scores=tuple(scores),
         times=tuple(times),
         scoring=rule.scoring,

@@ -17,7 +17,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from uwbbench.api import registry
 from uwbbench.api.errors import ScoringError
 from uwbbench.api.metric import Metric, Outcome
 from uwbbench.measure.accuracy.scoring import ScoringRules, outcomes
@@ -25,8 +24,6 @@ from uwbbench.measure.accuracy.stats import Difference, evaluate, holm, paired_d
 from uwbbench.results.comparison.units import Unit
 from uwbbench.results.pareto import NORMAL_975, Speed, speed_of
 from uwbbench.run.folder.folder import RunFolder
-
-METRICS = ("f1", "precision", "recall", "mae", "p95", "false_alarms_per_minute")
 
 Board = tuple[str, str, str, str]
 """Dataset, source, scoring and table."""
@@ -88,7 +85,10 @@ class TimeChange:
 
 
 def score_changes(
-    units: Sequence[Unit], rules: Sequence[ScoringRules], settings: Mapping[str, Any]
+    units: Sequence[Unit],
+    rules: Sequence[ScoringRules],
+    metrics: Mapping[str, type[Metric]],
+    settings: Mapping[str, Any],
 ) -> tuple[list[ScoreChange], list[str]]:
     """Every metric of every board, and what could not be judged.
 
@@ -96,6 +96,7 @@ def score_changes(
     ----------
     units : sequence of Unit
     rules : sequence of ScoringRules
+    metrics : mapping of str to type of Metric
     settings : mapping
         ``resamples``, ``confidence`` and ``seed`` of the intervals.
     """
@@ -112,15 +113,17 @@ def score_changes(
                 if table in after:
                     board = unit.dataset, unit.header.source, rule.scoring, table
                     boards[board][unit.detector].append((before[table], after[table]))
-    found = [change for board, members in boards.items() for change in _changes(board, members, settings)]
-    return found, list(missing)
+    every = [change for board, members in boards.items() for change in _changes(board, members, metrics, settings)]
+    return every, list(missing)
 
 
 def _changes(
-    board: Board, members: Mapping[str, list[tuple[Outcome, Outcome]]], settings: Mapping[str, Any]
+    board: Board,
+    members: Mapping[str, list[tuple[Outcome, Outcome]]],
+    metrics: Mapping[str, type[Metric]],
+    settings: Mapping[str, Any],
 ) -> Iterator[ScoreChange]:
-    for name in METRICS:
-        metric: type[Metric] = registry.load_plugin("metrics", name)
+    for name, metric in metrics.items():
         rows = []
         for detector, pairs in members.items():
             before, after = [pair[0] for pair in pairs], [pair[1] for pair in pairs]

@@ -3,13 +3,14 @@
 Conventions
 -----------
 * A board is one dataset, source, scoring and table of a suite; numbers of different boards are never put together.
-* Boards are ranked by F1; by recall where the truth is not exhaustive.
+* Boards are ranked by the metric that their experiment lists first, or by F1; by recall where the truth is not
+  exhaustive.
 * Two detectors are compared on the captures that both were scored on, in pairs: both are evaluated on the same drawn
   captures (or blocks of a second, where captures are few). The p-values of all pairs of a board are adjusted together
   after Holm, for each metric.
 * Two detectors *differ* if the adjusted p-value is below 0.05. They are *practically equal* if the whole 95 %
-  interval of their difference lies within the margin (0.01 of a share, 1 cm of an error), which a difference may do
-  that is certain but does not matter: then they are called equal. Otherwise the captures do not decide.
+  interval of their difference lies within the metric's margin (0.01 of a share, 1 cm of an error), which a difference
+  may do that is certain but does not matter: then they are called equal. Otherwise the captures do not decide.
 * The rank of a detector is one more than the number of ranked ones that are better by more than chance and more than
   the margin. Detectors share ranks, and one that was not scored on all captures of the board has none.
 * Time is the ratio to the reference detector of the suite, measured in alternating blocks on one machine. Over several
@@ -28,24 +29,19 @@ from typing import Any, Literal
 
 import numpy as np
 
-from uwbbench.api import registry
-from uwbbench.api.metric import Metric
-from uwbbench.measure.accuracy.stats import MINIMUM_GROUPS, Difference, Estimate, bootstrap, holm, paired_difference
+from uwbbench.measure.accuracy.metrics.choice import MetricChoice
+from uwbbench.measure.accuracy.stats import MINIMUM_GROUPS, Difference, Estimate, holm, paired_difference
 from uwbbench.results.leaderboard.runs import Run
 from uwbbench.results.leaderboard.suites import Contender, Suite
 from uwbbench.results.pareto import Speed, speed_of
-from uwbbench.results.results import Scored
+from uwbbench.results.results import Scored, estimates_of
 from uwbbench.results.slices import Board
 from uwbbench.run.folder.journal import Entry
 
-METRICS = ("f1", "recall", "precision", "mae", "p90", "p95", "false_alarms_per_minute")
-COMPARED = ("f1", "recall", "mae")
 SETTINGS: dict[str, Any] = {"resamples": 2000, "confidence": 0.95, "seed": 0}
 """Of all intervals of a site, whatever the runs used for theirs."""
 
 SIGNIFICANCE = 0.05
-MARGINS = {"": 0.01, "m": 0.01}
-"""Differences that do not matter, by unit: one hundredth of a share, one centimetre."""
 
 Verdict = Literal["differs", "equal", "undecided", "too few groups", "undefined"]
 
@@ -66,6 +62,8 @@ class Pair:
         The p-value after Holm.
     verdict : {"differs", "equal", "undecided", "too few groups", "undefined"}
         Undefined where one of them has no value, as it found nothing.
+    better : str or None
+        Key of the better one; None unless they differ, or where neither end of the metric is better.
     """
 
     first: str
@@ -75,14 +73,7 @@ class Pair:
     difference: Difference
     adjusted: float
     verdict: Verdict
-
-    @property
-    def better(self) -> str | None:
-        """Key of the better one; None unless they differ."""
-        if self.verdict != "differs":
-            return None
-        up = registry.load_plugin("metrics", self.metric).better == "higher"
-        return self.first if (self.difference.value > 0) == up else self.second
+    better: str | None
 
 
 @dataclass(frozen=True)
@@ -114,7 +105,10 @@ class Ranking:
     ----------
     suite : Suite
     board : Board
-    main : {"f1", "recall"}
+    exhaustive : bool
+        Whether the truth names all that is visible.
+    main : str
+        The metric that ranks.
     captures : int
         Captures that any of them was scored on.
     standings : tuple of Standing
@@ -123,15 +117,21 @@ class Ranking:
 
     suite: Suite
     board: Board
+    exhaustive: bool
     main: str
     captures: int
     standings: tuple[Standing, ...]
     pairs: tuple[Pair, ...]
 
     @property
-    def exhaustive(self) -> bool:
-        """Whether the truth names all that is visible."""
-        return self.main == "f1"
+    def metrics(self) -> MetricChoice:
+        """Metrics of its suite."""
+        return self.suite.metrics
+
+    @property
+    def headline(self) -> list[str]:
+        """Names of the few metrics that stand on the index."""
+        return self.metrics.headline(exhaustive=self.exhaustive)
 
     def pair(self, first: str, second: str, metric: str) -> Pair | None:
         """Comparison of two contenders, first minus second."""
@@ -159,9 +159,11 @@ def rankings(suite: Suite) -> list[Ranking]:
 
 def _ranking(suite: Suite, board: Board, members: Mapping[str, list[Scored]]) -> Ranking:
     every = [one for scored in members.values() for one in scored]
-    main = "f1" if all(one.outcome.exhaustive for one in every) else "recall"
+    metrics = suite.metrics
+    exhaustive = all(one.outcome.exhaustive for one in every)
+    main = metrics.ranking(exhaustive=exhaustive)
     captures = len({one.capture for one in every})
-    pairs = _pairs(members, [name for name in COMPARED if main == "f1" or name != "f1"])
+    pairs = _pairs(members, metrics, metrics.compared(exhaustive=exhaustive))
     speeds = speeds_of(suite, board[0])
     complete = {key for key, scored in members.items() if len(scored) == captures}
     ahead: Counter[str] = Counter()
@@ -176,35 +178,36 @@ def _ranking(suite: Suite, board: Board, members: Mapping[str, list[Scored]]) ->
         scored = members.get(contender.key, [])
         if not scored:
             continue
-        outcomes = [one.outcome for one in scored]
-        estimates = {name: bootstrap(_metric(name), outcomes, **SETTINGS) for name in METRICS}
+        estimates = estimates_of(metrics, scored, SETTINGS)
         ranked = decidable and contender.key in complete
         rank = ahead[contender.key] + 1 if ranked else None
         standings.append(Standing(contender, tuple(scored), estimates, rank, speeds.get(contender.key)))
-    standings.sort(key=lambda one: _order(one, main))
-    return Ranking(suite, board, main, captures, tuple(standings), pairs)
+    standings.sort(key=lambda one: _order(one, metrics[main].merit(one.estimates[main].value)))
+    return Ranking(suite, board, exhaustive, main, captures, tuple(standings), pairs)
 
 
-def _order(one: Standing, main: str) -> tuple[Any, ...]:
+def _order(one: Standing, merit: float) -> tuple[Any, ...]:
     """Ranked ones first, the best first; undefined values last."""
-    value = one.estimates[main].value
-    return one.rank is None, one.rank or 0, math.inf if math.isnan(value) else -value, one.contender.name
+    return one.rank is None, one.rank or 0, math.inf if math.isnan(merit) else -merit, one.contender.name
 
 
-def _pairs(members: Mapping[str, list[Scored]], metrics: Sequence[str]) -> tuple[Pair, ...]:
+def _pairs(members: Mapping[str, list[Scored]], metrics: MetricChoice, names: Sequence[str]) -> tuple[Pair, ...]:
     by_capture = {key: {one.capture: one.outcome for one in scored} for key, scored in members.items()}
-    found = []
-    for name in metrics:
-        compared = []
+    pairs = []
+    for name in names:
+        metric, compared = metrics[name], []
         for first, second in itertools.combinations(by_capture, 2):
             shared = sorted(set(by_capture[first]) & set(by_capture[second]))
             series = [[by_capture[key][capture] for capture in shared] for key in (first, second)]
-            compared.append((first, second, len(shared), paired_difference(_metric(name), *series, **SETTINGS)))
+            compared.append((first, second, len(shared), paired_difference(metric, *series, **SETTINGS)))
         adjusted = holm([one[3].p_value for one in compared])
         for (first, second, captures, difference), p_value in zip(compared, adjusted.tolist(), strict=True):
-            verdict = _verdict(difference, p_value, MARGINS[_metric(name).unit])
-            found.append(Pair(first, second, name, captures, difference, p_value, verdict))
-    return tuple(found)
+            verdict = _verdict(difference, p_value, metric.margin)
+            better = None
+            if verdict == "differs" and metric.better != "zero":
+                better = first if metric.merit(difference.value) > 0 else second
+            pairs.append(Pair(first, second, name, captures, difference, p_value, verdict, better))
+    return tuple(pairs)
 
 
 def _verdict(difference: Difference, adjusted: float, margin: float) -> Verdict:
@@ -215,11 +218,6 @@ def _verdict(difference: Difference, adjusted: float, margin: float) -> Verdict:
     if -margin < difference.low and difference.high < margin:
         return "equal"
     return "differs" if adjusted < SIGNIFICANCE else "undecided"
-
-
-def _metric(name: str) -> type[Metric]:
-    metric: type[Metric] = registry.load_plugin("metrics", name)
-    return metric
 
 
 # Times ---------------------------------------------------------------------------------------------------------

@@ -13,9 +13,9 @@ from uwbbench.measure.accuracy.scoring import ScoringRules
 from uwbbench.results.report import read_safely
 from uwbbench.results.results import Scored, scored
 from uwbbench.run.folder.folder import RunFolder
-from uwbbench.run.folder.identity import canonical
+from uwbbench.run.folder.identity import canonical, latency_identity
 from uwbbench.run.folder.journal import Entry
-from uwbbench.run.folder.verify import latency_identity, verify
+from uwbbench.run.folder.verify import verify
 
 
 class Unverified(UwbbenchError):
@@ -84,8 +84,9 @@ class Run:
     def machine_of(self, entry: Entry) -> str:
         """The machine that a latency unit was measured on, as one line."""
         sha256 = self.manifest["data"].get(entry.capture_id, "")
+        detector, settings = self.manifest["detectors"][entry.detector], self.experiment["latency"]
         for session in self.manifest["sessions"]:
-            if latency_identity(self.manifest, entry, sha256, session) == entry.identity:
+            if latency_identity(detector, sha256, settings, session["machine"]) == entry.identity:
                 return machine_name(session["machine"])
         raise StoreError(f"{self.folder.path}: no session measured {entry.detector} on {entry.capture}")
 

@@ -23,6 +23,7 @@ from typing import Any
 
 import numpy as np
 
+from uwbbench.measure.accuracy.metrics.choice import MetricChoice
 from uwbbench.results.leaderboard.runs import Run
 from uwbbench.results.results import Scored
 from uwbbench.run.folder.identity import canonical, digest
@@ -106,6 +107,11 @@ class Suite:
     def captures_of(self, dataset: str) -> list[str]:
         """Captures of a dataset."""
         return [capture for label, capture in self.captures if label == dataset]
+
+    @cached_property
+    def metrics(self) -> MetricChoice:
+        """Metrics that its runs show; what the newest run lists stands first."""
+        return MetricChoice([name for run in reversed(self.runs) for name in run.experiment["metrics"]])
 
     @property
     def datasets(self) -> list[str]:

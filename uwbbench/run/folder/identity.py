@@ -1,15 +1,28 @@
-"""Identity of things by content: SHA-256 of canonical JSON, never a repr or a file name."""
+"""What results are called and what they depend on, for whoever writes a run folder and whoever verifies it.
+
+Conventions
+-----------
+* Everything is known by its content: SHA-256 of canonical JSON, never a repr or a file name.
+* The *name* of a unit, and of its files, follows from what it is about: the same in every run of the same experiment.
+* The *identity* of a unit follows from all that its result depends on: a resumed run repeats what has another one, and
+  a stored unit whose identity does not follow from its manifest was made otherwise than the manifest says. The identity
+  of a detector is :func:`uwbbench.config.detector.detector_identity`.
+"""
 
 from __future__ import annotations
 
 import hashlib
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+
+if TYPE_CHECKING:
+    from uwbbench.measure.accuracy.scoring import ScoringRules
 
 
 def plain(value: Any) -> Any:
@@ -52,3 +65,94 @@ def digest(value: Any) -> str:
 def file_id(value: Any) -> str:
     """File name, without suffix, for results about ``value``: safe whatever names it holds."""
     return digest(value)[:20]
+
+
+def capture_name(dataset: str, params: Mapping[str, Any], capture: str) -> str:
+    """Name of the files of a capture.
+
+    Parameters
+    ----------
+    dataset : str
+        Registered name of the dataset.
+    params : mapping
+        Its parameters as written.
+    capture : str
+        Name of the capture in the dataset.
+    """
+    return file_id([dataset, params, capture])
+
+
+def listing_name(dataset: str) -> str:
+    """Name of a unit that stands for the captures of a dataset, by its label."""
+    return file_id(["listing", dataset])
+
+
+def stability_name(detector: str) -> str:
+    """Name of the unit of a detector's hard cases."""
+    return file_id(["stability", detector])
+
+
+def unit_name(kind: str, detector: str, dataset: str, capture: str) -> str:
+    """Name of the unit, and of the files, of a detector on a capture.
+
+    Parameters
+    ----------
+    kind : {"accuracy", "latency"}
+    detector : str
+        Name of the detector.
+    dataset : str
+        Label of the dataset.
+    capture : str
+        Name of the capture's files.
+    """
+    return file_id([kind, detector, dataset, capture])
+
+
+def accuracy_identity(detector: str, sha256: str, rules: Sequence[ScoringRules]) -> str:
+    """Identity of scores.
+
+    Parameters
+    ----------
+    detector : str
+        Identity of the detector.
+    sha256 : str
+        Of the capture's content.
+    rules : sequence of ScoringRules
+    """
+    return digest(["accuracy", detector, sha256, [asdict(rule) for rule in rules]])
+
+
+def latency_identity(detector: str, sha256: str, settings: Mapping[str, Any], machine: Mapping[str, Any]) -> str:
+    """Identity of times, which depend on the machine.
+
+    Parameters
+    ----------
+    detector : str
+        Identity of the detector.
+    sha256 : str
+        Of the capture's content; empty where it could not be opened for its scores.
+    settings : mapping
+        How calls are timed, as the manifest holds it.
+    machine : mapping
+        The machine, as a session of the manifest holds it.
+    """
+    return digest(["latency", detector, sha256, [settings, machine]])
+
+
+def stability_identity(detector: str, version: str, case_packages: Sequence[str] = ()) -> str:
+    """Identity of what the hard cases gave.
+
+    Parameters
+    ----------
+    detector : str
+        Identity of the detector.
+    version : str
+        Version of uwbbench, which has most of the cases.
+    case_packages : sequence of str
+        Names and versions of other packages that bring cases.
+
+    Returns
+    -------
+    str
+    """
+    return digest(["stability", detector, version, *case_packages])

@@ -1,15 +1,30 @@
-"""Scores of one unit as rows: the same for a fresh run and for scoring it again."""
+"""Rules and scores of a run as it stores them: the same for a fresh run, for scoring it again and for verifying it."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+import math
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from uwbbench.api.capture import CaptureHeader
 from uwbbench.api.detections import Detections
-from uwbbench.api.errors import ScoringError
-from uwbbench.measure.accuracy.scoring import ScoringRules, score
+from uwbbench.api.errors import PluginError, ScoringError
+from uwbbench.api.metric import Metric, Outcome
+from uwbbench.config.rules import RegionModel
+from uwbbench.measure.accuracy.metrics.choice import MetricChoice
+from uwbbench.measure.accuracy.scoring import Region, ScoringRules, outcomes, score
+from uwbbench.measure.accuracy.stats import evaluate
+from uwbbench.run.folder.folder import RunFolder
 from uwbbench.run.folder.journal import Entry
+
+
+def rules_of(experiment: Mapping[str, Any]) -> tuple[ScoringRules, ...]:
+    """Scoring rules of an experiment as the manifest holds it, one for each scoring."""
+    region = Region(**RegionModel.model_validate(experiment["region"]).limits)
+    return tuple(
+        ScoringRules(scoring, experiment["gate_m"], region, experiment["strongest"])
+        for scoring in experiment["scoring"]
+    )
 
 
 def score_rows(found: Detections, header: CaptureHeader, rules: Iterable[ScoringRules]) -> list[dict[str, Any]]:
@@ -26,6 +41,65 @@ def score_rows(found: Detections, header: CaptureHeader, rules: Iterable[Scoring
             if block is not None:
                 rows.append({**about, "table": table, "status": "scored", "reason": "", **block.to_dict()})
     return rows
+
+
+def with_metrics(
+    folder: RunFolder,
+    rows_of: Mapping[str, list[dict[str, Any]]],
+    rules: Sequence[ScoringRules],
+    listed: Sequence[str],
+) -> dict[str, list[dict[str, Any]]]:
+    """Rows with values of the metrics that an experiment lists, where these are installed.
+
+    Parameters
+    ----------
+    folder : RunFolder
+        That holds the detections.
+    rows_of : mapping
+        Rows of units that were done, of :func:`score_rows`.
+    rules : sequence of ScoringRules
+        That gave the rows.
+    listed : sequence of str
+
+    Raises
+    ------
+    PluginError
+        If a metric raises anything.
+    StoreError
+        If stored detections are missing or broken.
+    """
+    metrics = MetricChoice(listed)
+    columns = {name: column_of(name, metrics[name].unit) for name in listed if name not in metrics.absent}
+    made = {unit: list(rows) for unit, rows in rows_of.items()}
+    for entry in folder.entries() if columns else ():
+        rows = made.get(entry.unit, []) if entry.kind == "accuracy" else []
+        scored = {row["scoring"] for row in rows if row["status"] == "scored"}
+        if not scored:
+            continue
+        found, header = folder.detections(entry.unit), folder.header(entry.capture_id)
+        tables = {rule.scoring: outcomes(found, header, rule) for rule in rules if rule.scoring in scored}
+        for place, row in enumerate(rows):
+            if row["status"] == "scored":
+                outcome = tables[row["scoring"]][row["table"]]
+                values = {column: _value(name, metrics[name], outcome) for name, column in columns.items()}
+                rows[place] = values | row  # what is stored for every run anyway stays
+    return made
+
+
+def _value(name: str, metric: type[Metric], outcome: Outcome) -> float | None:
+    try:
+        value = evaluate(metric, [outcome])
+    except Exception as error:
+        raise PluginError(
+            f"metric '{name}' fails: {type(error).__name__}: {error}; what was detected is stored: mend the metric and "
+            "continue the run with --resume"
+        ) from error
+    return None if math.isnan(value) else value
+
+
+def column_of(name: str, unit: str) -> str:
+    """Column of a metric: lengths say that they are in metres."""
+    return f"{name}_m" if unit == "m" else name
 
 
 def table_of(entries: Iterable[Entry], rows_of: Mapping[str, list[dict[str, Any]]]) -> list[dict[str, Any]]:

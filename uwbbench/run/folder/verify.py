@@ -12,23 +12,33 @@ Conventions
 
 from __future__ import annotations
 
-import dataclasses
-import hashlib
-import json
 import math
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from uwbbench.api.errors import UwbbenchError
-from uwbbench.measure.accuracy.scoring import Region, ScoringRules
+from uwbbench.api.text import one_line, printable
+from uwbbench.config.detector import detector_identity
+from uwbbench.measure.accuracy.metrics.choice import MetricChoice
 from uwbbench.run.folder.folder import RunFolder
-from uwbbench.run.folder.identity import digest, file_id
+from uwbbench.run.folder.identity import (
+    accuracy_identity,
+    capture_name,
+    latency_identity,
+    listing_name,
+    stability_identity,
+    stability_name,
+    unit_name,
+)
 from uwbbench.run.folder.journal import Entry
-from uwbbench.run.folder.scored import score_rows, table_of
+from uwbbench.run.folder.scored import column_of, rules_of, score_rows, table_of, with_metrics
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 RELATIVE, ABSOLUTE = 1e-9, 1e-12
 """Numbers that differ by less are equal: sums may round otherwise on another processor."""
@@ -74,12 +84,6 @@ def verify(folder: RunFolder) -> Verification:
     return _Verifier(folder).verified()
 
 
-def latency_identity(manifest: Mapping[str, Any], entry: Entry, sha256: str, session: Mapping[str, Any]) -> str:
-    """Identity of a latency unit that was measured in a session: it depends on the machine."""
-    basis = [manifest["experiment"]["latency"], session["machine"]]
-    return digest(["latency", manifest["detectors"][entry.detector], sha256, basis])
-
-
 class _Verifier:
     """Checks that add to one list of problems."""
 
@@ -113,7 +117,7 @@ class _Verifier:
             self._problem(where, f"does not hold what a run of this version writes: {type(error).__name__}: {error}")
 
     def _problem(self, where: str, what: str) -> None:
-        line = " ".join(what.split())
+        line = one_line(what)
         self.problems.append(f"{where}: {line}" if not line.startswith(f"{where}:") else line)
 
     def _count(self, what: str) -> None:
@@ -152,10 +156,7 @@ class _Verifier:
         configs = {config["name"]: config for config in self.manifest["experiment"]["detectors"]}
         for name in sorted({*identities, *configs}):
             with self._checking(f"manifest.json, detector {_shown(name)}"):
-                used = {step["use"]: sources[step["use"]] for step in configs[name]["pipeline"]}
-                used |= {what: sha256 for what, sha256 in sources.items() if what.startswith("kernel ")}
-                text = json.dumps({"detector": configs[name], "sources": used}, sort_keys=True)
-                if hashlib.sha256(text.encode()).hexdigest() != identities[name]:
+                if detector_identity(configs[name], sources) != identities[name]:
                     self._problem("manifest.json", f"identity of detector {_shown(name)} is not that of its steps")
             self._count("detectors")
         for capture_id, sha256 in self.manifest["data"].items():
@@ -177,11 +178,11 @@ class _Verifier:
         if entry.status not in ("done", "failed"):
             self._problem(where, f"status must be done or failed, not {_shown(entry.status)}")
         if entry.kind == "listing":
-            expected = file_id(["listing", entry.dataset])
+            expected = listing_name(entry.dataset)
         elif entry.kind == "stability":
-            expected = file_id(["stability", entry.detector])
+            expected = stability_name(entry.detector)
         elif entry.kind in ("accuracy", "latency"):
-            expected = file_id([entry.kind, entry.detector, entry.dataset, self._capture_id(entry)])
+            expected = unit_name(entry.kind, entry.detector, entry.dataset, self._capture_name(entry))
         else:
             self._problem(where, f"no kind of unit '{_shown(entry.kind)}'")
             return
@@ -193,24 +194,24 @@ class _Verifier:
         elif entry.status == "done" and entry.kind != "listing":
             {"accuracy": self._accuracy, "latency": self._latency, "stability": self._stability}[entry.kind](entry)
 
-    def _capture_id(self, entry: Entry) -> str:
+    def _capture_name(self, entry: Entry) -> str:
         for used in self.manifest["experiment"]["datasets"]:
             if used["label"] == entry.dataset:
-                return file_id([used["use"], used["params"], entry.capture])
+                return capture_name(used["use"], used["params"], entry.capture)
         raise ValueError(f"the manifest has no dataset {_shown(entry.dataset)}")
 
     def _stability(self, entry: Entry) -> None:
         identity = self.manifest["detectors"][entry.detector]
-        versions = [session["versions"]["uwbbench"] for session in self.manifest["sessions"]]
-        self._identity(entry, [digest(["stability", identity, version]) for version in versions])
+        expected = [
+            stability_identity(identity, session["versions"]["uwbbench"], session.get("case_packages", ()))
+            for session in self.manifest["sessions"]
+        ]
+        self._identity(entry, expected)
 
     def _accuracy(self, entry: Entry) -> None:
         sha256 = self._content(entry)
-        experiment = self.manifest["experiment"]
-        rules = _rules(experiment)
-        identity = self.manifest["detectors"][entry.detector]
-        basis = [dataclasses.asdict(rule) for rule in rules]
-        self._identity(entry, [digest(["accuracy", identity, sha256, basis])])
+        rules = rules_of(self.manifest["experiment"])
+        self._identity(entry, [accuracy_identity(self.manifest["detectors"][entry.detector], sha256, rules)])
         found, header = self.folder.detections(entry.unit), self.folder.header(entry.capture_id)
         counts = {"frames": len(header), "processed": len(found.processed), "detections": len(found)}
         for name, count in counts.items():
@@ -228,8 +229,9 @@ class _Verifier:
 
     def _latency(self, entry: Entry) -> None:
         sha256 = self._content(entry) if entry.capture_id else ""
-        sessions = self.manifest["sessions"]
-        self._identity(entry, [latency_identity(self.manifest, entry, sha256, session) for session in sessions])
+        detector, settings = self.manifest["detectors"][entry.detector], self.manifest["experiment"]["latency"]
+        machines = [session["machine"] for session in self.manifest["sessions"]]
+        self._identity(entry, [latency_identity(detector, sha256, settings, machine) for machine in machines])
         times_us = self.folder.times_us(entry.unit)
         late = times_us > entry.facts["deadline_us"]
         again = {"n": len(times_us), "p50_us": float(np.median(times_us)), "mean_us": float(times_us.mean())}
@@ -238,7 +240,7 @@ class _Verifier:
         self._count("times summed up again")
 
     def _content(self, entry: Entry) -> str:
-        if entry.capture_id != self._capture_id(entry):
+        if entry.capture_id != self._capture_name(entry):
             raise ValueError("its capture is not the one that it names")
         return str(self.manifest["data"][entry.capture_id])
 
@@ -274,8 +276,10 @@ class _Verifier:
             done = {e.unit for e in self.entries if e.kind == "accuracy" and e.status == "done"}
             if done - set(self.sound):
                 return  # said already: what they would be compared with cannot be made
-            expected = {_key(row): row for row in table_of(self.entries, self.sound)}
-            rows: list[dict[str, Any]] = self.folder.scores().to_dict("records")  # type: ignore[assignment]
+            table = self.folder.scores()
+            whole = with_metrics(self.folder, self.sound, self.folder.rules, self._stored_metrics(table))
+            expected = {_key(row): row for row in table_of(self.entries, whole)}
+            rows: list[dict[str, Any]] = table.to_dict("records")  # type: ignore[assignment]
             stored = {_key(row): row for row in rows}
             for key in sorted({*expected, *stored}):
                 where = "scores.parquet, " + ", ".join(_shown(part) for part in key if part)
@@ -286,6 +290,15 @@ class _Verifier:
                 else:
                     self._same(where, [stored[key]], [expected[key]])
                 self._count("rows of scores")
+
+    def _stored_metrics(self, table: pd.DataFrame) -> list[str]:
+        """Listed metrics that were stored, which version 0.1.0 did not, and are installed."""
+        listed: list[str] = self.manifest["experiment"]["metrics"]
+        metrics = MetricChoice(listed)
+        self.notes += [
+            f"metric {_shown(name)} is not installed: its values were not checked" for name in metrics.absent
+        ]
+        return [name for name in listed if name not in metrics.absent and column_of(name, metrics[name].unit) in table]
 
     def _same(self, where: str, stored: list[Any], again: list[dict[str, Any]]) -> None:
         """Rows that were stored and computed again."""
@@ -300,18 +313,6 @@ class _Verifier:
                 of = " ".join(str(expected[key]) for key in ("scoring", "table") if expected.get(key))
                 made = "edited, or made by another version; 'uwbbench rescore' makes scores again"
                 self._problem(where, f"{of + ': ' if of else ''}{told}{more}: {made}")
-
-
-def _rules(experiment: Mapping[str, Any]) -> tuple[ScoringRules, ...]:
-    """Scoring rules of an experiment as the manifest tells it."""
-    region = experiment["region"]
-    degrees = region["half_angle_deg"]
-    half_angle_rad = None if degrees is None else math.radians(degrees)
-    sector = Region(region["min_range_m"], region["max_range_m"], half_angle_rad)
-    return tuple(
-        ScoringRules(scoring, experiment["gate_m"], sector, experiment["strongest"])
-        for scoring in experiment["scoring"]
-    )
 
 
 def _key(row: Mapping[str, Any]) -> tuple[str, ...]:
@@ -340,5 +341,4 @@ def _about(entry: Entry) -> str:
 
 def _shown(value: Any) -> str:
     """Value on one line, cut where it is long."""
-    text = "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in str(value))
-    return text if len(text) <= LONGEST_NAME else f"{text[: LONGEST_NAME - 3]}..."
+    return printable(value, LONGEST_NAME)

@@ -1,4 +1,4 @@
-"""Charts as Vega-Lite specifications: the page draws them, and pictures for print are made of the same ones.
+"""What all charts share: the specification around their layers, and how a detector looks.
 
 Conventions
 -----------

@@ -5,15 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
-from uwbbench.results.curves import ErrorCurve, axis_limit_m
+from uwbbench.results.curves import ErrorCurve, error_axis
 from uwbbench.results.slices import Slice
 from uwbbench.show.charts.chart import LEGEND, LINES, Series, Spec, axis, chart
+from uwbbench.show.text.numbers import number
 from uwbbench.show.text.quantity import Quantity
-from uwbbench.show.text.sheet import number
 
 SHARES = (0, 0.25, 0.5, 0.75, 0.9, 0.95, 1)
-SMALLEST_CM = 0.1
-"""Smallest error on a logarithmic axis."""
 
 
 def by_range(title: str, found: Sequence[Slice], spans: Sequence[str], names: Mapping[str, str], by: Quantity) -> Spec:
@@ -72,8 +70,8 @@ def by_range(title: str, found: Sequence[Slice], spans: Sequence[str], names: Ma
 
 def error_cdf(title: str, curves: Mapping[str, ErrorCurve], names: Mapping[str, str]) -> Spec:
     """Distribution of the absolute errors, one curve for each detector, with its percentiles."""
-    far_m, logarithmic = axis_limit_m(list(curves.values()))
-    least = SMALLEST_CM if logarithmic else 0.0
+    *ends_m, logarithmic = error_axis(list(curves.values()))
+    least, far = (100 * end_m for end_m in ends_m)
     rows: list[Spec] = []
     points: list[Spec] = []
     for detector, curve in curves.items():
@@ -91,7 +89,7 @@ def error_cdf(title: str, curves: Mapping[str, ErrorCurve], names: Mapping[str, 
         ]
     series = Series(names, [row["detector"] for row in rows])
     look = series.encoding(LINES, "strokeDash")
-    scale = {"type": "log" if logarithmic else "linear", "domain": [least, 100 * far_m], "nice": False}
+    scale = {"type": "log" if logarithmic else "linear", "domain": [least, far], "nice": False}
     x = axis("error", "Absolute error (cm)", scale=scale, axis={"format": "~g", "tickCount": 8})
     y = axis(
         "share",

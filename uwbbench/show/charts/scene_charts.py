@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 
 import numpy as np
@@ -11,6 +10,7 @@ from uwbbench.api.arrays import FloatArray
 from uwbbench.results.cases import Case
 from uwbbench.show.charts.chart import Spec, axis, chart, limits
 from uwbbench.show.charts.theme import SERIES
+from uwbbench.show.text.numbers import rounded
 
 NEAR = {True: "within the gate", False: "elsewhere"}
 
@@ -18,9 +18,9 @@ NEAR = {True: "within the gate", False: "elsewhere"}
 def radargram(title: str, case: Case, image: tuple[str, float] | None, names: Mapping[str, str]) -> Spec:
     """A capture over time and range: samples where they are at hand, true ranges, detections of a chosen detector."""
     truth = [
-        {"time": time, "range": range_m, "object": f"{column} {label}"}
-        for column, label in enumerate(case.obstacles)
-        for time, range_m in zip(_nulls(case.time_s), _nulls(case.range_m[:, column]), strict=True)
+        {"time": time, "range": range_m, "object": f"{place} {one.name}"}
+        for place, one in enumerate(case.ranges)
+        for time, range_m in zip(_nulls(case.time_s), _nulls(one.ahead_m), strict=True)
     ]
     found = [
         {"detector": names[marks.detector], "time": time, "range": range_m, "near": NEAR[near]}
@@ -69,12 +69,12 @@ def top_view(title: str, case: Case, names: Mapping[str, str]) -> Spec:
         {"x": x, "y": y, "order": index, "thing": "robot path", "kind": "path"}
         for index, (x, y) in enumerate(case.path_m.tolist())
     ]
-    for place, (label, structure, outline) in enumerate(case.outlines_m):
-        closed = np.concatenate([outline, outline[:1]]) if 2 < len(outline) < 20 else outline
-        kind = "structure" if structure else "truth"
+    for place, outline in enumerate(case.outlines):
+        points_m = outline.points_m if outline.moves else np.concatenate([outline.points_m, outline.points_m[:1]])
+        kind = "structure" if outline.structure else "truth"
         lines += [
-            {"x": x, "y": y, "order": index, "thing": f"{place} {label}", "kind": kind}
-            for index, (x, y) in enumerate(zip(_nulls(closed[:, 0]), _nulls(closed[:, 1]), strict=True))
+            {"x": x, "y": y, "order": index, "thing": f"{place} {outline.name}", "kind": kind}
+            for index, (x, y) in enumerate(zip(_nulls(points_m[:, 0]), _nulls(points_m[:, 1]), strict=True))
         ]
     found = [
         {"detector": names[marks.detector], "x": x, "y": y, "near": NEAR[near]}
@@ -135,4 +135,4 @@ def _nearness() -> Spec:
 
 def _nulls(values: FloatArray) -> list[float | None]:
     """Values as JSON holds them; None where there is none, which breaks a line."""
-    return [float(f"{value:.5g}") if math.isfinite(value) else None for value in values.tolist()]
+    return [rounded(value) for value in values.tolist()]

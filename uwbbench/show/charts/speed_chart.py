@@ -9,8 +9,8 @@ import numpy as np
 
 from uwbbench.results.pareto import Point
 from uwbbench.show.charts.chart import HEIGHT, Series, Spec, axis, chart, deadline, limits
+from uwbbench.show.text.numbers import between, number, probability
 from uwbbench.show.text.quantity import Quantity
-from uwbbench.show.text.sheet import number
 
 PLOT_PX = (520.0, HEIGHT - 110.0)
 """About the size of the plot in print, for which labels are placed."""
@@ -37,7 +37,9 @@ def speed_against_error(title: str, found: Sequence[Point], names: Mapping[str, 
     ends = [row[side] for row in rows for side in ("left", "right")]
     reach = [min(*ends, frame_period) / 1.25, max(*ends, frame_period) * 1.25]
     span = limits([row[side] for row in rows for side in ("low", "high")], share=0.12)
-    span = [max(span[0], 0.0), min(span[1], 1.01) if quantity.better == "higher" else span[1]]
+    lowest, highest = min(row["low"] for row in rows), max(row["high"] for row in rows)
+    is_share = quantity.better == "higher" and highest <= 1
+    span = [max(span[0], 0.0) if lowest >= 0 else span[0], min(span[1], 1.01) if is_share else span[1]]
     _place_labels(rows, reach, span)
 
     x = {"scale": {"type": "log", "domain": reach, "nice": False}, "axis": {"format": "~g"}}
@@ -88,7 +90,7 @@ def speed_against_error(title: str, found: Sequence[Point], names: Mapping[str, 
             "encoding": {"x": across, "y": up, "text": {"field": "label"}},
         },
     ]
-    better = "up" if quantity.better == "higher" else "down"
+    better = {"higher": "up", "lower": "down", "zero": "towards 0"}[quantity.better]
     subtitle = (
         f"Better: left and {better}. Filled: on the front by its values. P: bootstrap probability of being on it."
     )
@@ -99,7 +101,7 @@ def _row(point: Point, names: Mapping[str, str], quantity: Quantity) -> Spec:
     value, low, high = (quantity.scaled(v) for v in (point.error.value, point.error.low, point.error.high))
     speed = point.speed
     timed = not math.isnan(speed.low)
-    ends = f"[{number(speed.low, 3)}, {number(speed.high, 3)}]" if timed else "(no interval)"
+    ends = between(speed.low, speed.high, 3) or "(no interval)"
     plural = "capture" if speed.captures == 1 else "captures"
     return {
         "detector": names[point.detector],
@@ -110,19 +112,12 @@ def _row(point: Point, names: Mapping[str, str], quantity: Quantity) -> Spec:
         "low": value if math.isnan(low) else low,
         "high": value if math.isnan(high) else high,
         "front": point.on_front,
-        "label": f"{names[point.detector]}, P {_share(point.probability)}",
+        "label": f"{names[point.detector]}, P {probability(point.probability)}",
         "error": quantity.told(point.error),
         "time": f"{number(speed.ratio, 3)} {ends}, {speed.captures} timed {plural}",
         "p50": f"{number(speed.p50_us, 0)} us on this machine",
-        "chance": _share(point.probability),
+        "chance": probability(point.probability),
     }
-
-
-def _share(value: float) -> str:
-    """Probability from draws as a text, never rounded to certainty."""
-    if math.isnan(value):
-        return "n/a"
-    return ">0.99" if value > 0.99 else "<0.01" if value < 0.01 else f"{value:.2f}"
 
 
 def _place_labels(rows: list[Spec], reach: Sequence[float], span: Sequence[float]) -> None:

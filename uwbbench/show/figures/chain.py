@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from uwbbench.api.arrays import BoolArray
+from uwbbench.api.text import printable
 from uwbbench.show.figures import style
 from uwbbench.show.figures.source import Found
 from uwbbench.show.figures.topview import check_located, draw_scene, limits
@@ -105,7 +106,7 @@ def draw_pipeline(found: Found) -> Figure:
                 zorder=4,
                 rasterized=len(order) > 5000,
             )
-            axes.set_title(style.plain(f"({letter}) {panel.title}: {panel.rows.sum()}"), fontsize=7.5)
+            axes.set_title(printable(f"({letter}) {panel.title}: {panel.rows.sum()}"), fontsize=7.5)
             axes.set_xlim(span_x)
             axes.set_ylim(span_y)
             axes.locator_params(nbins=5)

@@ -15,8 +15,8 @@ from uwbbench.api.errors import CaptureError
 from uwbbench.measure.accuracy.judge import Region, Scene
 from uwbbench.results import radargram
 from uwbbench.results.comparison.flips import Flip
-from uwbbench.results.delay import delay_of_range, zero_tap
 from uwbbench.show.figures import style
+from uwbbench.show.text.numbers import number
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -63,7 +63,7 @@ def draw_flip(flip: Flip, region: Region, roots: Sequence[Path]) -> tuple[Figure
 
 
 def _errors(flip: Flip) -> str:
-    told = ["nothing" if np.isnan(e) else f"{100 * e:.1f} cm" for e in (flip.error_before_m, flip.error_after_m)]
+    told = ["nothing" if np.isnan(e) else number(e, 1, 100.0, "cm") for e in (flip.error_before_m, flip.error_after_m)]
     return f"Largest error before: {told[0]}; after: {told[1]}."
 
 
@@ -79,14 +79,9 @@ def _at_hand(flip: Flip, roots: Sequence[Path]) -> tuple[Capture | None, str]:
 def _response(axes: Axes, capture: Capture, flip: Flip, true_m: FloatArray) -> None:
     """Amplitude of the frame over range, with the ranges that are true and those that were found."""
     radar = capture.radar
-    block = Block(capture.frames(flip.frame, flip.frame + 1))
-    zero, origin = zero_tap(block, radar)
+    blocks = [Block(capture.frames(flip.frame, flip.frame + 1))]
     range_m = np.linspace(0.0, radar.window_m, 8 * radar.taps)
-    tap = delay_of_range(radar, range_m) / radar.sample_interval_s + zero[0]
-    amplitude = np.interp(tap, np.arange(radar.taps), block.frames.amplitude[0], left=np.nan, right=np.nan)
-    largest = float(np.max(amplitude, initial=0.0, where=np.isfinite(amplitude))) or 1.0
-    with np.errstate(divide="ignore"):
-        level_db = np.maximum(20 * np.log10(amplitude / largest), FLOOR_DB)
+    (level_db,), origin = radargram.levels(blocks, radar, range_m, np.array([flip.frame]), FLOOR_DB)
     axes.plot(range_m, level_db, color=style.BLACK)
     handles: list[Any] = []
     names: list[str] = []

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,7 +14,8 @@ from uwbbench.api.detections import Detections
 from uwbbench.api.errors import ConfigError
 from uwbbench.detect.pipeline import Pipeline
 from uwbbench.measure.accuracy.scoring import Region
-from uwbbench.results.delay import delay_of_range, zero_tap
+from uwbbench.results.ground_truth import true_ranges
+from uwbbench.results.radargram import levels
 from uwbbench.show.figures import style
 from uwbbench.show.figures.source import about
 
@@ -45,7 +46,14 @@ def draw_radargram(capture: Capture, detector: Pipeline | None = None) -> Figure
     if found is not None and len(found) and "range_m" not in found:
         raise ConfigError("the detections have no range_m; add the stage 'range' to the detector")
     range_m = np.linspace(0.0, capture.radar.window_m, min(ROWS, 4 * capture.radar.taps))
-    time_s, image_db, zero = _image(capture, detector, range_m)
+    shown = np.arange(0, len(capture), _step(len(capture)), dtype=np.int64)
+    time_s = capture.trajectory.timestamp_s[shown] - capture.trajectory.timestamp_s[0]
+    blocks: Iterable[Block]
+    if detector is None:
+        blocks = (Block(frames) for frames in capture.blocks(BLOCK_FRAMES))
+    else:
+        blocks = detector.signals(capture)
+    image_db, zero = levels(blocks, capture.radar, range_m, shown, FLOOR_DB)
     with style.styled():
         drawn = style.figure(style.PAGE_IN, 3.4)
         axes = drawn.subplots()
@@ -81,33 +89,6 @@ def _step(frames: int) -> int:
     return -(-frames // COLUMNS)
 
 
-def _image(capture: Capture, detector: Pipeline | None, range_m: FloatArray) -> tuple[FloatArray, FloatArray, str]:
-    """Times (columns,), amplitudes in dB (columns, ranges), and what delays count from."""
-    radar, step = capture.radar, _step(len(capture))
-    offset = delay_of_range(radar, range_m) / radar.sample_interval_s
-    blocks: Iterator[Block]
-    if detector is None:
-        blocks = (Block(frames) for frames in capture.blocks(BLOCK_FRAMES))
-    else:
-        blocks = detector.signals(capture)
-    time_s: list[float] = []
-    columns: list[FloatArray] = []
-    origin = "the first path"
-    for block in blocks:
-        zero, origin = zero_tap(block, radar)
-        for row in np.flatnonzero(block.frames.index % step == 0):
-            time_s.append(float(block.frames.timestamp_s[row]))
-            amplitude = block.frames.amplitude[row]
-            shown = np.interp(offset + zero[row], np.arange(radar.taps), amplitude, left=np.nan, right=np.nan)
-            columns.append(shown if block.frames.valid[row] else np.full(len(range_m), np.nan))
-    image = np.array(columns)
-    strongest = float(np.max(image, initial=0.0, where=np.isfinite(image))) or 1.0
-    with np.errstate(divide="ignore"):
-        image_db = 20 * np.log10(image / strongest)
-    since = np.array(time_s) - capture.trajectory.timestamp_s[0]
-    return since, np.maximum(image_db, FLOOR_DB), origin
-
-
 def _edges(centres: FloatArray) -> FloatArray:
     """Cell borders (n + 1,) half way between centres (n,)."""
     if len(centres) == 1:
@@ -120,23 +101,16 @@ def _truth(axes: Axes, header: CaptureHeader) -> tuple[list[Any], list[str]]:
     """Draw the true range of each obstacle: thin outside the sector that scores look at, nothing where it is hidden."""
     from matplotlib import patheffects
 
-    if header.truth is None:
-        return [], []
-    sight = header.truth.seen_from(header.radar, header.trajectory)
     time_s = header.trajectory.timestamp_s - header.trajectory.timestamp_s[0]
     handles: list[Any] = []
     labels = []
     halo = [patheffects.withStroke(linewidth=2.6, foreground="white")]
-    widest_rad = Region().widest_rad(header.radar)
     colours = (style.BLUE, style.GREEN, style.PURPLE, style.SKY, style.ORANGE)
-    obstacles = [(column, thing) for column, thing in enumerate(header.truth.objects) if not thing.structure]
-    for number, (column, thing) in enumerate(obstacles):
-        shown = np.where(sight.occluded[:, column], np.nan, sight.range_m[:, column])
+    for number, one in enumerate(true_ranges(header)):
         look: dict[str, Any] = {"color": colours[number % 5], "ls": style.LINES[1 + number % 6], "lw": 1.3}
-        axes.plot(time_s, shown, **{**look, "lw": 0.6, "ls": "-"}, zorder=2)
-        ahead = np.where(np.abs(sight.azimuth_rad[:, column]) <= widest_rad, shown, np.nan)
-        handles += axes.plot(time_s, ahead, path_effects=halo, zorder=3, **look)
-        labels.append(f"true range, {thing.name}")
+        axes.plot(time_s, one.range_m, **{**look, "lw": 0.6, "ls": "-"}, zorder=2)
+        handles += axes.plot(time_s, one.ahead_m, path_effects=halo, zorder=3, **look)
+        labels.append(f"true range, {one.name}")
     return handles, labels
 
 

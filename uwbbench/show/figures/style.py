@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from uwbbench.api.errors import UwbbenchError
+from uwbbench.api.text import printable
 from uwbbench.run.folder.files import replacing
 
 if TYPE_CHECKING:
@@ -110,20 +111,8 @@ def figure(width_in: float, height_in: float) -> Figure:
 def caption(drawn: Figure, sentences: Iterable[str]) -> None:
     """Write what the picture shows under it, across its width."""
     columns = int(drawn.get_figwidth() * 72 / (CAPTION_POINTS * 0.47))
-    text = " ".join(plain(sentence) for sentence in sentences if sentence)
+    text = " ".join(printable(sentence) for sentence in sentences if sentence)
     drawn.supxlabel(textwrap.fill(text, columns), x=0.01, ha="left", fontsize=CAPTION_POINTS, color="0.2")
-
-
-def plain(name: object) -> str:
-    r"""Text on one line, whatever a name holds: control characters and bytes that are no text become escapes.
-
-    Examples
-    --------
-    >>> plain("run\t1")
-    'run\\t1'
-    """
-    text = str(name).encode("utf-8", "backslashreplace").decode()
-    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
 
 
 def legend(axes: Axes, handles: Sequence[Any], labels: Sequence[str], **where: Any) -> None:
@@ -131,7 +120,7 @@ def legend(axes: Axes, handles: Sequence[Any], labels: Sequence[str], **where: A
 
     A label that starts with an underscore is shown too, which matplotlib would leave out.
     """
-    shown = [f"\u200b{plain(label)}" if label.startswith("_") else plain(label) for label in labels]
+    shown = [f"\u200b{printable(label)}" if label.startswith("_") else printable(label) for label in labels]
     if handles:
         axes.legend(handles, shown, **where)
 

@@ -9,6 +9,7 @@ import numpy as np
 from uwbbench.api.capture import CaptureHeader
 from uwbbench.api.detections import Detections
 from uwbbench.api.errors import ConfigError
+from uwbbench.results.ground_truth import outlines
 from uwbbench.show.figures import style
 
 if TYPE_CHECKING:
@@ -28,18 +29,17 @@ def draw_scene(axes: Axes, header: CaptureHeader) -> tuple[list[Any], list[str]]
     ]
     labels = ["robot path", "start"]
     looks = {False: ("true outline", style.BLACK, 1.2), True: ("structure", style.GREY, 0.6)}
-    for thing in header.truth.objects if header.truth is not None else ():
-        label, colour, width = looks[thing.structure]
-        outline = thing.outline_m[..., :2]
-        if thing.moves:  # an outline for each frame would cover the picture: its middle's path says where it went
-            middle = outline.mean(axis=1)
-            handle: Any = axes.plot(middle[:, 0], middle[:, 1], color=style.GREEN, lw=0.9, ls=":")[0]
+    for outline in outlines(header):
+        label, colour, width = looks[outline.structure]
+        points_m = outline.points_m
+        if outline.moves:
+            handle: Any = axes.plot(*points_m.T, color=style.GREEN, lw=0.9, ls=":")[0]
             label = "path of a moving object"
-        elif len(outline) == 1:
-            handle = axes.plot(*outline.T, "*", color=colour, ms=7, mfc="none", ls="none", zorder=5)[0]
+        elif len(points_m) == 1:
+            handle = axes.plot(*points_m.T, "*", color=colour, ms=7, mfc="none", ls="none", zorder=5)[0]
             label = "true place"
         else:
-            handle = axes.add_patch(Polygon(outline, closed=True, fill=False, ec=colour, lw=width, zorder=5))
+            handle = axes.add_patch(Polygon(points_m, closed=True, fill=False, ec=colour, lw=width, zorder=5))
         if label not in labels:
             handles.append(handle)
             labels.append(label)
@@ -50,7 +50,7 @@ def draw_scene(axes: Axes, header: CaptureHeader) -> tuple[list[Any], list[str]]
 def limits(header: CaptureHeader, found: Detections) -> tuple[tuple[float, float], tuple[float, float]]:
     """Span in x and in y that holds path, outlines and points."""
     points = [header.trajectory.position_m[:, :2], np.stack([found["x_m"], found["y_m"]], axis=1)]
-    points += [thing.outline_m[..., :2].reshape(-1, 2) for thing in (header.truth.objects if header.truth else ())]
+    points += [outline.points_m for outline in outlines(header)]
     every = np.concatenate(points)
     every = every[np.isfinite(every).all(axis=1)]
     low, high = every.min(axis=0) - MARGIN_M, every.max(axis=0) + MARGIN_M

@@ -9,6 +9,7 @@ from uwbbench.api.capture import Capture, CaptureHeader
 from uwbbench.api.errors import CaptureError
 from uwbbench.api.radar import Radar
 from uwbbench.api.truth import Truth
+from uwbbench.results.ground_truth import true_ranges
 from uwbbench.results.radargram import picture
 from uwbbench.show.notebook import elements
 
@@ -115,17 +116,14 @@ def _label(x: float, y: float, words: str, anchor: str) -> str:
 
 def _truth_lines(shown: Capture, far_m: float) -> list[str]:
     """True range of each obstacle over time, where it is known, in the window and not hidden."""
-    if shown.truth is None or not far_m > 0:
+    if not far_m > 0:
         return []
-    sight = shown.truth.seen_from(shown.radar, shown.trajectory)
     chosen = np.unique(np.linspace(0, len(shown) - 1, min(120, len(shown))).astype(np.int64))
     x = LEFT + (WIDTH - 6 - LEFT) * (chosen + 0.5) / len(shown)
     lines = []
-    obstacles = [column for column, thing in enumerate(shown.truth.objects) if not thing.structure]
-    for number, column in enumerate(obstacles[:MOST_OBJECTS]):
-        range_m = np.where(sight.occluded[:, column], np.nan, sight.range_m[:, column])[chosen]
-        y = HEIGHT - BOTTOM - (HEIGHT - BOTTOM - 6) * range_m / far_m
-        seen = np.isfinite(y) & (range_m <= far_m)
+    for number, one in enumerate(true_ranges(shown, frames=chosen)[:MOST_OBJECTS]):
+        y = HEIGHT - BOTTOM - (HEIGHT - BOTTOM - 6) * one.range_m / far_m
+        seen = np.isfinite(y) & (one.range_m <= far_m)
         path = _path(x, y, seen)
         colour = COLOURS[number % len(COLOURS)]
         look = f'fill="none" stroke="{colour}" stroke-width="1.6" stroke-dasharray="5 3"'

@@ -8,6 +8,7 @@ import numpy as np
 
 from uwbbench.api.detections import COLUMNS, Detections
 from uwbbench.show.notebook import elements
+from uwbbench.show.text.numbers import number
 
 FIRST_ROWS = 10
 _SHOWN = {
@@ -60,4 +61,4 @@ def _cell(name: str, value: float) -> str:
     if isinstance(value, np.integer):
         return str(value)
     unit = _unit(name)
-    return f"{value:.4g}" if unit is None else f"{value * unit[2]:.{unit[3]}f}"
+    return f"{value:.4g}" if unit is None else number(value, unit[3], unit[2])

@@ -7,6 +7,7 @@ from typing import Any
 from uwbbench.api import registry
 from uwbbench.api.errors import PluginError
 from uwbbench.api.stage import describe
+from uwbbench.api.text import without_markup
 from uwbbench.config.detector import BY_CHANNEL, Step
 from uwbbench.detect.pipeline import Pipeline
 from uwbbench.show.notebook import elements
@@ -35,7 +36,7 @@ def _step(number: int, step: Step) -> str:
             name,
             _value(step.params.get(name, field.default)),
             "set" if name in step.params else "default",
-            field.description or "",
+            without_markup(field.description or ""),
         )
         for name, field in stage.params_type().model_fields.items()
     ]

@@ -5,6 +5,8 @@ from __future__ import annotations
 import html
 from collections.abc import Iterable, Mapping, Sequence
 
+from uwbbench.api.text import one_line
+
 LONGEST = 400
 """Characters of a name or value that are shown; no name, however long, pushes the rest away."""
 
@@ -35,8 +37,7 @@ def text(value: object) -> str:
     >>> text("<b>run\n1</b>")
     '&lt;b&gt;run 1&lt;/b&gt;'
     """
-    plain = " ".join(str(value).encode("utf-8", "backslashreplace").decode().split())
-    return html.escape(plain if len(plain) <= LONGEST else f"{plain[: LONGEST - 1]}\u2026")
+    return html.escape(one_line(value, LONGEST))
 
 
 def frame(kind: str, name: object, *parts: str, simulated: bool = False) -> str:

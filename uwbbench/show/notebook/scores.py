@@ -2,34 +2,15 @@
 
 from __future__ import annotations
 
-import math
-
+from uwbbench.api import registry
 from uwbbench.api.metric import Outcome
-from uwbbench.measure.accuracy.metrics.detection import F1, FalseAlarmsPerMinute, Precision, Recall
-from uwbbench.measure.accuracy.metrics.error import (
-    Bias,
-    MeanAbsoluteError,
-    Percentile90,
-    Percentile95,
-    StandardDeviation,
-)
+from uwbbench.measure.accuracy.metrics.choice import MetricChoice
 from uwbbench.measure.accuracy.scoring import ScoreBlock, Scores
 from uwbbench.measure.accuracy.stats import MINIMUM_GROUPS, Estimate, bootstrap
 from uwbbench.show.notebook import elements
+from uwbbench.show.text.numbers import UNDEFINED, between, number
 from uwbbench.show.text.quantity import Quantity
 from uwbbench.show.text.wording import TABLES
-
-METRICS = {
-    "precision": Precision,
-    "recall": Recall,
-    "f1": F1,
-    "mae": MeanAbsoluteError,
-    "p90": Percentile90,
-    "p95": Percentile95,
-    "sd": StandardDeviation,
-    "bias": Bias,
-    "false_alarms_per_minute": FalseAlarmsPerMinute,
-}
 
 
 def scores(shown: Scores) -> str:
@@ -44,8 +25,9 @@ def scores(shown: Scores) -> str:
 
 
 def _table(outcome: Outcome) -> str:
-    estimates = {name: bootstrap(metric, [outcome]) for name, metric in METRICS.items()}
-    rows = [_row(Quantity.of(name, METRICS[name]), estimate) for name, estimate in estimates.items()]
+    metrics = MetricChoice(list(registry.entries("metrics")))
+    estimates = {name: bootstrap(metric, [outcome]) for name, metric in metrics.items() if name not in metrics.absent}
+    rows = [_row(Quantity.of(name, metrics[name]), estimate) for name, estimate in estimates.items()]
     groups = next(iter(estimates.values())).groups
     few = f"{groups} blocks of a second: too few (below {MINIMUM_GROUPS}) for intervals"
     enough = (
@@ -56,13 +38,10 @@ def _table(outcome: Outcome) -> str:
 
 
 def _row(quantity: Quantity, estimate: Estimate) -> tuple[str, str, str, str]:
-    def number(value: float) -> str:
-        return f"{quantity.scaled(value):.{quantity.digits}f}"
-
-    if math.isnan(estimate.value):
-        return quantity.axis, "n/a", "", f"{estimate.n} {quantity.samples}"
-    held = "n/a" if math.isnan(estimate.low) else f"[{number(estimate.low)}, {number(estimate.high)}]"
-    return quantity.axis, number(estimate.value), held, f"{estimate.n} {quantity.samples}"
+    shown = quantity.digits, quantity.factor
+    value, ends = number(estimate.value, *shown), between(estimate.low, estimate.high, *shown)
+    held = "" if value == UNDEFINED else ends or UNDEFINED
+    return quantity.axis, value, held, f"{estimate.n} {quantity.samples}"
 
 
 def _counts(block: ScoreBlock) -> str:

@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 
 from uwbbench.api.errors import CaptureError
-from uwbbench.measure.accuracy.metrics.error import MeanAbsoluteError
 from uwbbench.measure.accuracy.stats import MINIMUM_GROUPS
 from uwbbench.results import radargram
 from uwbbench.results.cases import Case, cases
@@ -24,12 +23,10 @@ from uwbbench.results.results import Scored
 from uwbbench.results.slices import ALL, Board, Slice, cuts, range_edges_m, slices, span_name
 from uwbbench.show.charts import error_charts, scene_charts, speed_chart, time_chart
 from uwbbench.show.charts.chart import Spec
+from uwbbench.show.text.numbers import number, rounded
 from uwbbench.show.text.quantity import Quantity
-from uwbbench.show.text.sheet import labels, number
+from uwbbench.show.text.sheet import labels
 from uwbbench.show.text.wording import TABLES
-
-CHARTED = ("f1", "recall", "mae", "p95")
-"""Metrics of the charts."""
 
 
 @dataclass(frozen=True)
@@ -62,8 +59,7 @@ class Content:
         self.settings = {**report.experiment["intervals"], "seed": report.experiment["seed"]}
         self.detectors = labels(report.detectors)
         self.datasets = labels(used["label"] for used in report.experiment["datasets"])
-        self.quantities = {name: Quantity.of(name, metric) for name, metric in report.metrics.items()}
-        self.quantities["matched_mae"] = Quantity.of("matched_mae", MeanAbsoluteError)
+        self.quantities = Quantity.of_all(report.metrics)
         self.edges_m = range_edges_m(report.scored)
         self.spans = [span_name(*ends) for ends in zip(self.edges_m[:-1], self.edges_m[1:], strict=True)]
 
@@ -114,26 +110,28 @@ class Content:
     def summary(self) -> list[str]:
         """One sentence for each dataset: who leads, how sure that is, and at what cost."""
         sentences = []
-        for about, found in self.report.estimates:
+        for about, estimates in self.report.estimates:
             key = about["dataset"], about["source"]
             if self.leaders.get(key) != about["detector"] or about["table"] != "filtering":
                 continue
             if about["scoring"] != next(b[2] for b in self.boards if b[:2] == key):
                 continue
-            sentences.append(self._sentence(about, found))
+            sentences.append(self._sentence(about, estimates))
         return sentences
 
-    def _sentence(self, about: Mapping[str, Any], found: Mapping[str, Any]) -> str:
-        main = self.quantities["f1" if about["exhaustive"] else "recall"]
-        error = self.quantities["mae"]
+    def _sentence(self, about: Mapping[str, Any], estimates: Mapping[str, Any]) -> str:
+        metrics, exhaustive = self.report.metrics, about["exhaustive"]
+        main = self.quantities[metrics.ranking(exhaustive=exhaustive)]
+        said = [main, *(self.quantities[name] for name in metrics.error(exhaustive=exhaustive))]
+        figures = " and ".join(f"{by.title} {by.value_of(estimates[by.name])}" for by in said)
         plural = "capture" if about["captures"] == 1 else "captures"
         what = f"{about['captures']} {about['source']} {plural} of {self.datasets[about['dataset']]}"
         leader = self.detectors[about["detector"]]
         text = (
             f"On {what} ({about['scored_frames']} scored frames, {about['scoring']} scoring), {leader} leads with "
-            f"{main.title} {main.value_of(found[main.name])} and {error.title} {error.value_of(found['mae'])}"
+            f"{figures}"
         )
-        if math.isnan(found[main.name].low):
+        if math.isnan(estimates[main.name].low):
             text += f" (no intervals: fewer than {MINIMUM_GROUPS} groups)"
         speed = self.speeds.get(about["dataset"], {}).get(about["detector"])
         if speed is None:
@@ -147,10 +145,13 @@ class Content:
         """Title of a chart, which says so where captures are simulated."""
         return f"{what}: {self.datasets[dataset]}, {'SIMULATED' if source == 'simulated' else 'measured'}"
 
+    def exhaustive(self, board: Board) -> bool:
+        """Whether the truth names all that is visible in every capture of a board."""
+        return all(one.outcome.exhaustive for one in self.boards[board])
+
     def charted(self, board: Board) -> list[str]:
-        """Metrics that charts of a board can show: F1 only where the truth is exhaustive."""
-        exhaustive = all(one.outcome.exhaustive for one in self.boards[board])
-        return [name for name in CHARTED if exhaustive or name != "f1"]
+        """Metrics that charts of a board show."""
+        return self.report.metrics.headline(exhaustive=self.exhaustive(board))
 
     def pareto(self, board: Board, name: str) -> Spec | None:
         """Speed against error; None where fewer than two detectors were timed."""
@@ -209,7 +210,7 @@ class Content:
     def cases(self) -> list[Case]:
         """Captures to look at."""
         entries = [e for e in self.report.entries if (e.kind, e.status) == ("accuracy", "done")]
-        return list(cases(self.report.folder, entries, self.report.scored, self.leaders))
+        return list(cases(self.report.folder, entries, self.report.scored, self.leaders, self.report.metrics))
 
     @cached_property
     def looks(self) -> list[dict[str, Any]]:
@@ -225,7 +226,7 @@ class Content:
         radar = self.title(f"{which} capture, {capture}", case.dataset, source)
         text = (
             f"{which} capture of {self.detectors[case.leader]} on {self.datasets[case.dataset]}: {capture}, "
-            f"{quantity.title} {number(case.score, quantity.digits)} in {case.scoring} scoring, "
+            f"{quantity.title} {quantity.text(case.score)} in {case.scoring} scoring, "
             f"{len(case.header)} frames."
         )
         order = {name: place for place, name in enumerate(self.report.detectors)}
@@ -299,6 +300,8 @@ class Content:
                 one.captures,
                 one.frames,
                 [_packed(one.estimates[name]) for name in self.quantities],
+                one.hits > 0,
+                one.errors,
             ]
             for one in self.slices
         ]
@@ -321,7 +324,7 @@ class Content:
 
     def _board(self, board: Board, materials: Mapping[str, str]) -> dict[str, Any]:
         dataset, source, scoring, table = board
-        members = self.boards[board]
+        members, metrics, exhaustive = self.boards[board], self.report.metrics, self.exhaustive(board)
         same = {
             f"{channel}|{materials.get(material, '')}": f"{kept[0]}|{materials.get(kept[1], '')}"
             for (channel, material), (kept, _) in cuts(members).items()
@@ -330,7 +333,8 @@ class Content:
             "dataset": f"{self.datasets[dataset]} ({source})",
             "scoring": scoring,
             "table": TABLES[table],
-            "exhaustive": all(one.outcome.exhaustive for one in members),
+            "columns": metrics.defined(exhaustive=exhaustive),
+            "main": metrics.ranking(exhaustive=exhaustive),
             "cuts": same,
             "charted": self.charted(board),
             "missing": self._missing(board),
@@ -368,20 +372,15 @@ class Content:
                     speed = self.speeds.get(dataset, {}).get(detector)
                     ratio = [speed.ratio, speed.low, speed.high] if speed else [None] * 3
                     calls = sum(one["n"] for one in facts)
-                    row[index] = [*map(_number, ratio), *(_median(facts, key) for key in ("p50_us", "p99_us")), calls]
+                    row[index] = [*map(rounded, ratio), *(_median(facts, key) for key in ("p50_us", "p99_us")), calls]
             rows.append(row)
         return rows
 
 
 def _median(facts: Sequence[Mapping[str, Any]], key: str) -> float | None:
     known = [one[key] for one in facts if one[key] is not None]
-    return _number(float(np.median(known))) if known else None
+    return rounded(float(np.median(known))) if known else None
 
 
 def _packed(estimate: Any) -> list[Any]:
-    return [_number(estimate.value), _number(estimate.low), _number(estimate.high), estimate.n, estimate.groups]
-
-
-def _number(value: float | None) -> float | None:
-    """Five significant digits, which is more than any interval bears."""
-    return None if value is None or not math.isfinite(value) else float(f"{value:.5g}")
+    return [rounded(estimate.value), rounded(estimate.low), rounded(estimate.high), estimate.n, estimate.groups]

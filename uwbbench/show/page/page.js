@@ -1,30 +1,9 @@
-"use strict";
 (() => {
   const read = (id) => JSON.parse(document.getElementById(id).textContent);
   const data = read("data"), config = read("theme-config");
   const at = (id) => document.getElementById(id);
-  const root = document.documentElement;
+  const { root, make, sortBy, sortable } = base;
 
-  // Theme ------------------------------------------------------------------------------------------------------
-  const themes = ["auto", "light", "dark"];
-  const remembered = () => { try { return localStorage.getItem("uwbbench-theme"); } catch { return null; } };
-  function setTheme(name) {
-    if (name === "auto") root.removeAttribute("data-theme"); else root.dataset.theme = name;
-    at("theme").textContent = "Theme: " + name;
-    at("theme").dataset.now = name;
-    try { localStorage.setItem("uwbbench-theme", name); } catch { /* private windows keep nothing */ }
-  }
-  at("theme").hidden = false;
-  at("theme").addEventListener("click", () => setTheme(themes[(themes.indexOf(at("theme").dataset.now) + 1) % 3]));
-  setTheme(themes.includes(remembered()) ? remembered() : "auto");
-
-  // Small helpers ----------------------------------------------------------------------------------------------
-  function make(tag, text, attributes = {}) {
-    const element = document.createElement(tag);
-    if (text !== undefined) element.textContent = text;
-    for (const [name, value] of Object.entries(attributes)) element.setAttribute(name, value);
-    return element;
-  }
   function fill(select, options, keep) {
     select.replaceChildren(...options.map(([value, text]) => make("option", text, { value })));
     if (options.some(([value]) => value === keep)) select.value = keep;
@@ -32,44 +11,6 @@
   }
   const distinct = (values) => [...new Set(values)];
   const shown = (value, digits, factor) => value === null ? "n/a" : (value * factor).toFixed(digits);
-
-  // Sorting, of any table whose head holds buttons --------------------------------------------------------------
-  const keyOf = (cell) => {
-    const text = cell.dataset.key ?? cell.textContent.trim();
-    const match = /^[-+]?\d[\d.]*(e[-+]?\d+)?/i.exec(text);
-    return match ? Number(match[0]) : /^(n\/a|not |none$|$)/.test(text) ? null : text;
-  };
-  function sortBy(table, column, descending) {
-    const body = table.tBodies[0];
-    const rows = [...body.rows].map((row) => [keyOf(row.cells[column]), row]);
-    const sign = descending ? -1 : 1;
-    rows.sort(([a], [b]) => {
-      if (a === null || b === null) return (a === null) - (b === null);
-      if (typeof a === "number" && typeof b === "number") return sign * (a - b);
-      return sign * String(a).localeCompare(String(b), "en", { numeric: true });
-    });
-    body.append(...rows.map(([, row]) => row));
-    [...table.tHead.rows[0].cells].forEach((head, index) => {
-      if (index === column) head.setAttribute("aria-sort", descending ? "descending" : "ascending");
-      else head.removeAttribute("aria-sort");
-    });
-  }
-  function sortable(table) {
-    [...table.tHead.rows[0].cells].forEach((head, column) => {
-      const button = make("button", head.textContent, { type: "button", title: "Sort by " + head.textContent });
-      button.addEventListener("click", () => {
-        const up = head.getAttribute("aria-sort") === "ascending";
-        const first = head.dataset.first === "descending" && !head.hasAttribute("aria-sort");
-        sortBy(table, column, first || up);
-      });
-      head.replaceChildren(button);
-    });
-  }
-  for (const table of document.querySelectorAll("table.sortable")) {
-    for (const row of table.tBodies[0].rows) for (const cell of row.cells) if (keyOf(cell) !== null && typeof keyOf(cell) === "string") cell.classList.add("text");
-    [...table.tHead.rows[0].cells].forEach((head, column) => head.classList.toggle("text", table.tBodies[0].rows[0].cells[column].classList.contains("text")));
-    sortable(table);
-  }
 
   // Charts -----------------------------------------------------------------------------------------------------
   const options = { mode: "vega-lite", renderer: "svg", actions: false, ast: true, defaultStyle: false, config, tooltip: { disableDefaultStyle: true } };
@@ -144,14 +85,10 @@
     }
     const quantity = (name) => data.quantities.find((one) => one.name === name);
 
-    const ahead = ["f1", "recall", "precision", "mae", "p95"], timed = ["time ratio", "p50 (us)", "p99 (us)"];
+    const timed = ["time ratio", "p50 (us)", "p99 (us)"];
     const counted = ["captures", "frames (n)", "detections (n)"];
-    const rank = (name) => ahead.includes(name) ? ahead.indexOf(name) : ahead.length;
-    function columnsOf(board) {
-      const open = ["precision", "f1", "false_alarms_per_minute"];
-      return data.quantities.map((one, index) => ({ one, index })).filter(({ one }) => board.exhaustive || !open.includes(one.name))
-        .sort((a, b) => rank(a.one.name) - rank(b.one.name));
-    }
+    const headOf = (one) => one.unit ? `${one.title} (${one.unit})` : one.title;
+    const columnsOf = (board) => board.columns.map((name) => { const one = quantity(name); return { one, index: data.quantities.indexOf(one) }; });
     function cellOf(value, low, high, digits, factor, title) {
       const cell = make("td", shown(value, digits, factor));
       cell.dataset.key = value === null ? "n/a" : String(value);
@@ -172,12 +109,11 @@
       const before = sorted && [sorted.textContent, sorted.getAttribute("aria-sort") === "descending"];
       const head = make("thead"), body = make("tbody"), line = make("tr");
       line.append(make("th", "detector", { scope: "col" }));
-      for (const { one } of columns) line.append(make("th", one.unit ? `${one.title} (${one.unit})` : one.title, { scope: "col", "data-first": one.better === "higher" ? "descending" : "ascending" }));
+      for (const { one } of columns) line.append(make("th", headOf(one), { scope: "col", "data-first": one.better === "higher" ? "descending" : "ascending" }));
       for (const name of [...timed, ...counted]) line.append(make("th", name, { scope: "col" }));
       head.append(line);
-      const recall = data.quantities.findIndex((one) => one.name === "recall");
       const best = columns.map(({ one, index }) => {
-        const known = rows.filter((row) => row[7][recall][0] > 0).map((row) => row[7][index][0]).filter((value) => value !== null);
+        const known = rows.filter((row) => row[8]).map((row) => row[7][index][0]).filter((value) => value !== null);
         if (known.length < 2 || one.better === "zero") return null;
         return one.better === "higher" ? Math.max(...known) : Math.min(...known);
       });
@@ -188,7 +124,7 @@
           const [value, low, high, n, groups] = values[index];
           const title = value === null ? "undefined here: nothing was retained, nothing was to be found, or too few samples" : `n = ${n} ${one.samples}, ${groups} groups`;
           const cell = cellOf(value, low, high, one.digits, one.factor, title);
-          if (value !== null && value === best[place] && values[recall][0] > 0) cell.classList.add("best");
+          if (value !== null && value === best[place] && row[8]) cell.classList.add("best");
           tr.append(cell);
         });
         const times = data.times[board.timing][row[4]];
@@ -197,16 +133,15 @@
           const [ratio, low, high, p50, p99, calls] = times;
           tr.append(cellOf(ratio, low, high, 2, 1, `n = ${calls} calls`), cellOf(p50, null, null, 0, 1, `n = ${calls} calls`), cellOf(p99, null, null, 0, 1, "needs 368 calls"));
         }
-        const errors = data.quantities.findIndex((one) => one.name === "mae");
-        for (const count of [row[5], row[6], values[errors][3]]) tr.append(make("td", String(count)));
+        for (const count of [row[5], row[6], row[9]]) tr.append(make("td", String(count)));
         body.append(tr);
       }
       table.replaceChildren(table.caption ?? make("caption", "Leaderboard", { class: "hidden" }), head, body);
       sortable(table);
-      const first = columns.find(({ one }) => one.name === (board.exhaustive ? "f1" : "recall")).one;
+      const first = quantity(board.main);
       const heads = [...table.tHead.rows[0].cells].map((cell) => cell.textContent);
-      const column = before && heads.includes(before[0]) ? heads.indexOf(before[0]) : heads.indexOf(first.title);
-      if (rows.length) sortBy(table, column, before && heads.includes(before[0]) ? before[1] : true);
+      const column = before && heads.includes(before[0]) ? heads.indexOf(before[0]) : heads.indexOf(headOf(first));
+      if (rows.length) sortBy(table, column, before && heads.includes(before[0]) ? before[1] : first.better === "higher");
       at("board-note").textContent = rows.length ? `${rows.length} detectors, ${board.dataset}, ${board.scoring} scoring, ${board.table}.`
         : cut === undefined ? "No capture of this dataset has this channel with this material." : "No row fits these filters.";
       at("board-missing").replaceChildren(...board.missing.map((text) => make("li", text)));

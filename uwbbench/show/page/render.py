@@ -1,35 +1,27 @@
-"""Writing the page: one HTML file that needs no network, under a policy that lets nothing else run.
+"""The page of a report, and its charts as pictures.
 
-The script of the charts (Vega, Vega-Lite and Vega-Embed) is bundled by vl-convert and stands in the page once. The
-content security policy names the two scripts by their hashes; expressions of charts are interpreted, not compiled.
+The script of the charts (Vega, Vega-Lite and Vega-Embed) is bundled by vl-convert and stands in the page once.
+Expressions of charts are interpreted, not compiled, as the page's policy asks.
 """
 
 from __future__ import annotations
 
-import base64
-import hashlib
 import json
 from functools import lru_cache
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from uwbbench.api.errors import UwbbenchError
 from uwbbench.measure.accuracy.stats import MINIMUM_GROUPS
-from uwbbench.run.folder.identity import plain
+from uwbbench.run.folder.files import replacing, write_json, write_text
 from uwbbench.show.charts.theme import PAGE, PRINT
+from uwbbench.show.extras import report_tools
+from uwbbench.show.html.render import badge, document, embedded
 from uwbbench.show.page.content import Content
 from uwbbench.show.text.formats import INDEX, MARK
 from uwbbench.show.text.report import Tables
-from uwbbench.show.text.sheet import shown
+from uwbbench.show.text.sheet import sentence, shown
 
-NEEDS = "the HTML report and its figures need vl-convert and Jinja2; install them with: pip install 'uwbbench[report]'"
 FIGURE_WIDTH = 620
-LONGEST_TEXT = 600
-
-
-class ReportToolsError(UwbbenchError):
-    """The libraries that make pages and figures are not installed."""
 
 
 def page(content: Content) -> str:
@@ -40,25 +32,20 @@ def page(content: Content) -> str:
     ReportToolsError
         If Jinja2 or vl-convert is not installed.
     """
-    try:
-        from jinja2 import Environment, StrictUndefined
-        from markupsafe import Markup
-    except ImportError as error:
-        raise ReportToolsError(NEEDS) from error
-    bundle, script, style = _bundle(), _resource("page.js"), _resource("page.css")
     report = content.report
     manifest = report.folder.manifest
     session = manifest["sessions"][-1]
     name = shown(report.experiment["name"])
     tables = _tables(Tables(report))
-    template = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
-    simulated = any(board[1] == "simulated" for board in content.boards)
-    html = template.from_string(_resource("page.html")).render(
-        policy=_policy(bundle, script, style),
+    sources = {board[1] for board in content.boards}
+    return document(
+        "page/page",
+        _bundle(),
+        generator=MARK,
+        badge=badge(sources or {one["source"] for one in report.captures}),
         name=name,
-        kind=_kind(content),
-        simulated=simulated,
-        description=_cut(" ".join(report.experiment["description"].split())),
+        simulated="simulated" in sources,
+        lead=sentence(report.experiment["description"]),
         sections=_sections(content, tables),
         summary=content.summary(),
         counts=_counts(content),
@@ -69,17 +56,13 @@ def page(content: Content) -> str:
         looks=content.looks,
         tables=tables,
         latencies=content.timings,
-        notes=[_cut(note) for note in report.notes],
+        notes=[sentence(note) for note in report.notes],
         facts=_facts(session, report.experiment),
         manifest=json.dumps(manifest, indent=2, ensure_ascii=False),
         made=f"Made by uwbbench {session['versions']['uwbbench']} from a run started {session['started']}.",
-        style=Markup(style),  # noqa: S704 - our own
-        script=Markup(script),  # noqa: S704 - our own
-        bundle=Markup(bundle),  # noqa: S704 - of vl-convert
-        data=Markup(_embedded(content.data())),  # noqa: S704 - cannot end its element
-        config=Markup(_embedded(PAGE)),  # noqa: S704
+        data=embedded(content.data()),
+        config=embedded(PAGE),
     )
-    return html.encode("utf-8", "backslashreplace").decode()
 
 
 def write_figures(content: Content, folder: Path) -> list[Path]:
@@ -92,9 +75,8 @@ def write_figures(content: Content, folder: Path) -> list[Path]:
     StoreError
         If a file cannot be written.
     """
-    from uwbbench.run.folder.files import replacing, write_json, write_text
-
-    vl_convert = _vl_convert()
+    with report_tools():
+        import vl_convert
     written = []
     for picture in content.pictures():
         spec = {**picture.spec, "width": FIGURE_WIDTH, "config": {**PRINT, "background": "white"}}
@@ -108,49 +90,13 @@ def write_figures(content: Content, folder: Path) -> list[Path]:
     return written
 
 
-def _vl_convert() -> Any:
-    try:
-        import vl_convert
-    except ImportError as error:
-        raise ReportToolsError(NEEDS) from error
-    return vl_convert
-
-
 @lru_cache(maxsize=1)
 def _bundle() -> str:
     """Script of the charts; it must not hold what would end its element."""
-    script: str = _vl_convert().javascript_bundle()
+    with report_tools():
+        import vl_convert
+    script: str = vl_convert.javascript_bundle()  # type: ignore[call-arg]  # its stub knows no default
     return script.replace("</script", "<\\/script").replace("<!--", "<\\!--")
-
-
-def _resource(name: str) -> str:
-    return files("uwbbench.show.page").joinpath(name).read_text(encoding="utf-8")
-
-
-def _policy(*parts: str) -> str:
-    """Content security policy: nothing from outside, and no script or style but these."""
-    *scripts, style = (
-        f"'sha256-{base64.b64encode(hashlib.sha256(part.encode()).digest()).decode()}'" for part in parts
-    )
-    rules = ("default-src 'none'", f"script-src {' '.join(scripts)}", f"style-src {style}", "img-src data:")
-    return "; ".join((*rules, "base-uri 'none'", "form-action 'none'"))
-
-
-def _embedded(value: Any) -> str:
-    """JSON that stands in a script element: no character in it can end the element or start a comment."""
-    text = json.dumps(plain(value), separators=(",", ":"), allow_nan=False)
-    return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
-
-
-def _kind(content: Content) -> str:
-    sources = {board[1] for board in content.boards} or {one["source"] for one in content.report.captures}
-    return {frozenset({"simulated"}): "SIMULATED", frozenset({"measured"}): "MEASURED", frozenset(): "NO RESULT"}.get(
-        frozenset(sources), "MEASURED AND SIMULATED"
-    )
-
-
-def _cut(text: str) -> str:
-    return text if len(text) <= LONGEST_TEXT else f"{text[:LONGEST_TEXT]}…"
 
 
 def _counts(content: Content) -> str:
@@ -193,7 +139,7 @@ def _facts(session: dict[str, Any], experiment: dict[str, Any]) -> list[tuple[st
     region = {key: value for key, value in experiment["region"].items() if value is not None}
     return [
         ("started", session["started"]),
-        ("command", _cut(" ".join(session["command"]))),
+        ("command", sentence(" ".join(session["command"]))),
         ("machine", f"{machine['cpu']}, {machine['usable_cores']} cores, {machine['os']}"),
         ("versions", ", ".join(f"{name} {number}" for name, number in versions.items())),
         ("scoring", f"{', '.join(experiment['scoring'])}; gate {100 * experiment['gate_m']:g} cm"),

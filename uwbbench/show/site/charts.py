@@ -7,7 +7,6 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
-from uwbbench.api import registry
 from uwbbench.results.curves import error_curve
 from uwbbench.results.leaderboard.ranking import SETTINGS, Ranking
 from uwbbench.results.pareto import points
@@ -15,7 +14,7 @@ from uwbbench.run.folder.identity import digest
 from uwbbench.show.charts import error_charts, speed_chart
 from uwbbench.show.charts.chart import Spec
 from uwbbench.show.charts.theme import PAGE
-from uwbbench.show.page.render import NEEDS, ReportToolsError
+from uwbbench.show.extras import report_tools
 from uwbbench.show.text.quantity import Quantity
 from uwbbench.show.text.sheet import shown
 
@@ -30,11 +29,11 @@ def pareto(ranking: Ranking, metric: str, title: str, names: Mapping[str, str]) 
         for one in ranking.standings
         if one.speed is not None
     }
-    found = points(members, speeds, registry.load_plugin("metrics", metric), SETTINGS)
-    if not found:
+    drawn = points(members, speeds, ranking.metrics[metric], SETTINGS)
+    if not drawn:
         return None
-    quantity = Quantity.of(metric, registry.load_plugin("metrics", metric))
-    return speed_chart.speed_against_error(f"{title}: speed against {quantity.title}", found, names, quantity)
+    quantity = Quantity.of(metric, ranking.metrics[metric])
+    return speed_chart.speed_against_error(f"{title}: speed against {quantity.title}", drawn, names, quantity)
 
 
 def errors(ranking: Ranking, title: str, names: Mapping[str, str]) -> Spec | None:
@@ -52,10 +51,8 @@ def svg(spec: Spec) -> str:
     ReportToolsError
         If vl-convert is not installed.
     """
-    try:
+    with report_tools():
         import vl_convert
-    except ImportError as error:
-        raise ReportToolsError(NEEDS) from error
     whole: dict[str, Any] = {**spec, "width": WIDTH, "config": PAGE}
     drawn: str = vl_convert.vegalite_to_svg(whole)
     plain = re.sub(r' (?:role|aria-[a-z]+)="[^"<>]*"', "", drawn)

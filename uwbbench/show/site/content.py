@@ -9,22 +9,17 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
-from uwbbench.api import registry
 from uwbbench.measure.accuracy.stats import Estimate
 from uwbbench.results.leaderboard.ranking import Pair, Ranking, Standing, rankings, reference_of
 from uwbbench.results.leaderboard.runs import Run
 from uwbbench.results.leaderboard.suites import Suite
+from uwbbench.results.results import errors_in
 from uwbbench.show.site import charts
 from uwbbench.show.site.names import Names
-from uwbbench.show.text.quantity import Quantity
-from uwbbench.show.text.sheet import interval, number, shown
+from uwbbench.show.text.numbers import between, interval, number, p_value
+from uwbbench.show.text.quantity import Quantity, undefined_titles
+from uwbbench.show.text.sheet import sentence, shown
 from uwbbench.show.text.wording import TABLES
-
-SHOWN = ("f1", "recall", "precision", "mae", "p95", "false_alarms_per_minute")
-SHOWN_FIRST = ("f1", "recall", "mae", "p95")
-"""Metrics of a board on its own page, and on the index."""
-
-LONGEST_TEXT = 600
 
 VERDICTS = {
     "differs": "differ",
@@ -133,12 +128,11 @@ class Content:
 
     # Boards ----------------------------------------------------------------------------------------------------
 
-    def board(self, ranking: Ranking, metrics: Sequence[str] = SHOWN) -> Table:
-        """Leaderboard of one board."""
+    def board(self, ranking: Ranking, *, headline: bool = False) -> Table:
+        """Leaderboard of one board, with all metrics or the headline ones."""
         _, _, scoring, table = ranking.board
-        if not ranking.exhaustive:
-            metrics = [name for name in metrics if name in ("recall", "mae", "p95")]
-        quantities = {name: quantity(name) for name in metrics}
+        names = ranking.headline if headline else ranking.metrics.defined(exhaustive=ranking.exhaustive)
+        quantities = {name: quantity(ranking, name) for name in names}
         heads = [one.axis for one in quantities.values()]
         columns = (
             "detector",
@@ -159,7 +153,8 @@ class Content:
             cells += [speed_cell(one), self._against(ranking, leader, one)]
             cells.append(Cell(f"{len(one.scored)} of {ranking.captures}", key=str(len(one.scored))))
             frames = sum(len(part.outcome.group) for part in one.scored)
-            rows.append((*cells, Cell(str(frames)), Cell(str(one.estimates["mae"].n))))
+            errors = errors_in(part.outcome for part in one.scored)
+            rows.append((*cells, Cell(str(frames)), Cell(str(errors))))
         title = f"{scoring} scoring, {TABLES[table]}"
         return Table(title, columns, tuple(rows), tuple(self._board_notes(ranking)))
 
@@ -176,16 +171,19 @@ class Content:
         if pair is None:
             return Cell("n/a")
         word = {"differs": "worse" if pair.better == pair.second else "better", "equal": "equal"}.get(pair.verdict)
-        difference = pair_text(pair)
-        return Cell(word or pair.verdict, small=difference, title=f"adjusted p {p_text(pair.adjusted)}")
+        difference = pair_text(ranking, pair)
+        return Cell(word or pair.verdict, small=difference, title=f"adjusted p {p_value(pair.adjusted)}")
 
     @staticmethod
     def _board_notes(ranking: Ranking) -> Iterator[str]:
         if not ranking.exhaustive:
             yield (
-                "The truth does not name all that is visible: precision and F1 are undefined, errors are of matches, "
-                "and the rank is by recall."
+                f"The truth does not name all that is visible: {undefined_titles(ranking.metrics)} are undefined, "
+                f"errors are of matches, and the rank is by {quantity(ranking, ranking.main).title}."
             )
+        elif ranking.metrics.listed:
+            yield f"The rank is by {quantity(ranking, ranking.main).title}."
+        yield from ranking.metrics.notes
         if all(one.rank is None for one in ranking.standings):
             yield "No ranks: captures, or blocks of a second, are too few to tell detectors apart."
         elif any(one.rank is None for one in ranking.standings):
@@ -195,14 +193,15 @@ class Content:
         """Who leads, and who is as good."""
         ranking = section.main
         first, others = ranking.standings[0], ranking.standings[1:]
-        by = quantity(ranking.main)
+        by = quantity(ranking, ranking.main)
+        highest = "highest" if by.better == "higher" else "lowest"
         words: dict[str, list[str]] = {}
         for one in others:
             pair = ranking.pair(first.contender.key, one.contender.key, ranking.main)
             if pair is not None:
                 words.setdefault(pair.verdict, []).append(self.names.detectors[one.contender.key])
         text = (
-            f"{self.names.detectors[first.contender.key]} has the highest {by.title}, "
+            f"{self.names.detectors[first.contender.key]} has the {highest} {by.title}, "
             f"{by.value_of(first.estimates[ranking.main])} ({ranking.board[2]} scoring)"
         )
         for verdict, said in (
@@ -235,11 +234,13 @@ class Content:
         """All comparisons of a board."""
         rows = []
         for pair in ranking.pairs:
-            by = quantity(pair.metric)
+            by = quantity(ranking, pair.metric)
             names = [Cell(self.names.detectors[key]) for key in (pair.first, pair.second)]
             counts = [Cell(str(pair.captures)), Cell(str(pair.difference.groups))]
             verdict = Cell(VERDICTS[pair.verdict])
-            rows.append((*names, Cell(by.title), pair_cell(pair), Cell(p_text(pair.adjusted)), verdict, *counts))
+            rows.append(
+                (*names, Cell(by.title), pair_cell(ranking, pair), Cell(p_value(pair.adjusted)), verdict, *counts)
+            )
         columns = ("first", "second", "metric", "difference", "adjusted p", "verdict", "captures", "groups (n)")
         return Table("Compared in pairs", columns, tuple(rows))
 
@@ -255,7 +256,7 @@ class Content:
             ),
             ("scoring", f"{', '.join(rule.scoring for rule in rules)}; gate {100 * rules[0].gate_m:g} cm"),
             ("runs", ", ".join(shown(run.name) for run in suite.runs)),
-            ("machines", "; ".join(line(machine) for machine in machines)),
+            ("machines", "; ".join(sentence(machine) for machine in machines)),
             ("reference of times", "none" if reference is None else shown(reference[0])),
         ]
 
@@ -322,16 +323,15 @@ def _board_dict(ranking: Ranking) -> dict[str, Any]:
     }
 
 
-def quantity(name: str) -> Quantity:
-    """How a metric is shown."""
-    return Quantity.of(name, registry.load_plugin("metrics", name))
+def quantity(ranking: Ranking, name: str) -> Quantity:
+    """How a metric of a board is shown."""
+    return Quantity.of(name, ranking.metrics[name])
 
 
 def metric_cell(by: Quantity, estimate: Estimate) -> Cell:
     """Value with its interval below."""
     text = number(estimate.value, by.digits, by.factor)
-    whole = interval(estimate.value, estimate.low, estimate.high, by.digits, by.factor)
-    ends = whole.removeprefix(text).strip()
+    ends = between(estimate.low, estimate.high, by.digits, by.factor)
     return Cell(text, small=ends, key=_key(estimate.value), title=by.told(estimate))
 
 
@@ -340,40 +340,19 @@ def speed_cell(one: Standing) -> Cell:
     speed = one.speed
     if speed is None:
         return Cell("not timed", key="n/a")
-    whole = interval(speed.ratio, speed.low, speed.high, 2)
-    text = number(speed.ratio, 2)
-    return Cell(text, small=whole.removeprefix(text).strip(), key=_key(speed.ratio))
+    return Cell(number(speed.ratio, 2), small=between(speed.low, speed.high, 2), key=_key(speed.ratio))
 
 
-def pair_text(pair: Pair) -> str:
+def pair_text(ranking: Ranking, pair: Pair) -> str:
     """Difference with unit and interval."""
-    by, d = quantity(pair.metric), pair.difference
+    by, d = quantity(ranking, pair.metric), pair.difference
     text = f"{interval(d.value, d.low, d.high, by.digits, by.factor)} {by.unit}".strip()
     return re.sub(r"-(0\.0*)(?!\d)", r"\1", text)  # what rounds to nothing has no sign
 
 
-def pair_cell(pair: Pair) -> Cell:
+def pair_cell(ranking: Ranking, pair: Pair) -> Cell:
     """Difference of a pair."""
-    return Cell(pair_text(pair), key=_key(pair.difference.value))
-
-
-def p_text(value: float) -> str:
-    """A p-value; never rounded to 0.
-
-    Examples
-    --------
-    >>> p_text(0.0002), p_text(0.0312)
-    ('<0.001', '0.031')
-    """
-    if math.isnan(value):
-        return "n/a"
-    return "<0.001" if value < 0.001 else f"{value:.3f}"
-
-
-def line(text: str) -> str:
-    """Text on one line, without control characters, cut where it is very long."""
-    whole = "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in " ".join(text.split()))
-    return whole if len(whole) <= LONGEST_TEXT else f"{whole[:LONGEST_TEXT]}..."
+    return Cell(pair_text(ranking, pair), key=_key(pair.difference.value))
 
 
 def _key(value: float) -> str:

@@ -3,27 +3,26 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from uwbbench.measure.accuracy.stats import MINIMUM_GROUPS
-from uwbbench.results.leaderboard.ranking import COMPARED, MARGINS, SETTINGS, SIGNIFICANCE, speeds_by_machine
+from uwbbench.results.leaderboard.ranking import SETTINGS, SIGNIFICANCE, speeds_by_machine
 from uwbbench.results.leaderboard.suites import Contender, Suite
+from uwbbench.show.html.render import badge
 from uwbbench.show.site.content import (
-    SHOWN_FIRST,
     VERDICTS,
     Cell,
     Content,
     Section,
     Table,
-    line,
     metric_cell,
-    p_text,
     pair_cell,
     quantity,
 )
-from uwbbench.show.text.sheet import interval, number, shown
+from uwbbench.show.text.numbers import interval, number, p_value
+from uwbbench.show.text.sheet import sentence, shown
 from uwbbench.show.text.wording import TABLES
 
 
@@ -87,8 +86,8 @@ class Page:
 HOW = (
     f"Rank: one more than the number of detectors that are better by more than chance (Holm-adjusted p below "
     f"{SIGNIFICANCE:g}) and more than the margin. Detectors share ranks.",
-    f"Practically equal: the whole {SETTINGS['confidence']:.0%} interval of the difference lies within the margin, "
-    f"{MARGINS['']:g} of a share or {100 * MARGINS['m']:g} cm of an error. Not told apart: the captures do not decide.",
+    f"Practically equal: the whole {SETTINGS['confidence']:.0%} interval of the difference lies within the metric's "
+    "margin. Not told apart: the captures do not decide.",
     "Pairs are compared on the captures that both were scored on, on the same bootstrap draws of captures; of blocks "
     f"of a second where captures are fewer than {MINIMUM_GROUPS}. Brackets: {SETTINGS['confidence']:.0%} intervals.",
     "Time is only given as a ratio to the common reference detector, measured in alternating blocks on one machine. "
@@ -110,11 +109,6 @@ def pages(content: Content) -> Iterator[Page]:
     yield _runs(content)
 
 
-def _badge(sources: set[str]) -> str:
-    kinds = {frozenset({"simulated"}): "SIMULATED", frozenset({"measured"}): "MEASURED", frozenset(): "NO RESULT"}
-    return kinds.get(frozenset(sources), "MEASURED AND SIMULATED")
-
-
 def _index(content: Content) -> Page:
     parts = []
     for suite in content.suites:
@@ -134,20 +128,33 @@ def _index(content: Content) -> Page:
                     facts=tuple(content.suite_facts(suite)) if place == 0 else (),
                     charts=() if chart is None else (chart,),
                     notes=(none,) if chart is None else (),
-                    tables=(content.board(section.main, SHOWN_FIRST),),
+                    tables=(content.board(section.main, headline=True),),
                     link=(section.address, "All scorings, captures and comparisons"),
                 )
             )
     detectors = len(content.names.detectors)
     lead = f"{detectors} detectors in {len(content.runs)} verified runs. "
     lead += "Only what was measured on the same captures under the same scoring rules is compared."
-    parts.append(Part("How to read it", notes=HOW))
-    return Page("index.html", "Leaderboard", _badge({one.source for one in content.sections}), lead, tuple(parts))
+    parts.append(Part("How to read it", notes=(*HOW, *_margins(content.sections))))
+    return Page("index.html", "Leaderboard", badge({one.source for one in content.sections}), lead, tuple(parts))
+
+
+def _margins(sections: Sequence[Section]) -> Iterator[str]:
+    """Differences that do not matter, of each metric that is compared."""
+    margins = {}
+    for section in sections:
+        for pair in section.main.pairs:
+            by = quantity(section.main, pair.metric)
+            margins[by.title] = by.text(section.main.metrics[pair.metric].margin)
+    if margins:
+        yield f"Margins: {', '.join(f'{title} {margin}' for title, margin in margins.items())}."
 
 
 def _dataset(content: Content, section: Section) -> Page:
     suite = section.suite
-    drawn = [content.pareto(section, name) for name in (section.main.main, "mae")] + [content.errors(section)]
+    main = section.main
+    charted = (main.main, *main.metrics.error(exhaustive=main.exhaustive))
+    drawn = [content.pareto(section, name) for name in charted] + [content.errors(section)]
     first = Part(
         title="Speed and error",
         sentences=(content.sentence(section),),
@@ -163,8 +170,8 @@ def _dataset(content: Content, section: Section) -> Page:
     ]
     facts = Part("What was compared", facts=tuple(content.suite_facts(suite)), tables=(_captures(section),))
     lead = f"Dataset of {content.names.suite(suite)}."
-    parts = (first, *boards, facts, Part("How to read it", notes=HOW))
-    return Page(section.address, section.label, _badge({section.source}), lead, parts)
+    parts = (first, *boards, facts, Part("How to read it", notes=(*HOW, *_margins([section]))))
+    return Page(section.address, section.label, badge({section.source}), lead, parts)
 
 
 def _captures(section: Section) -> Table:
@@ -179,9 +186,9 @@ def _captures(section: Section) -> Table:
             else [
                 str(len(header)),
                 "none" if header.radar.channel is None else str(header.radar.channel),
-                line(header.license),
-                line(header.citation),
-                line(header.description),
+                sentence(header.license),
+                sentence(header.citation),
+                sentence(header.description),
             ]
         )
         rows.append(tuple(Cell(text) for text in (shown(capture), *about, sha256[:12] or "not opened by any run")))
@@ -225,11 +232,15 @@ def _detector(content: Content, contender: Contender) -> Page:
     ]
     versions = f" Other versions of the same name: {', '.join(dict.fromkeys(others))}." if others else ""
     lead = f"Identity {contender.identity[:12]}: steps, parameters and sources.{versions}"
-    return Page(content.names.detector_page(contender), label, _badge({s.source for s in sections}), lead, tuple(parts))
+    return Page(content.names.detector_page(contender), label, badge({s.source for s in sections}), lead, tuple(parts))
 
 
 def _results(content: Content, contender: Contender, sections: list[Section]) -> Table:
-    names = ("f1", "recall", "precision", "mae", "p95")
+    quantities = {
+        name: quantity(section.main, name)
+        for section in sections
+        for name in section.main.metrics.defined(exhaustive=True)
+    }
     rows = []
     for section in sections:
         for ranking in section.rankings:
@@ -243,8 +254,12 @@ def _results(content: Content, contender: Contender, sections: list[Section]) ->
                     Cell("–", key="n/a") if one.rank is None else Cell(f"{one.rank} of {len(ranking.standings)}"),
                 ]
                 captures = Cell(f"{len(one.scored)} of {ranking.captures}")
-                rows.append((*about, *(metric_cell(quantity(name), one.estimates[name]) for name in names), captures))
-    columns = ("dataset", "suite", "scoring", "rank", *(quantity(name).axis for name in names), "captures")
+                cells = [
+                    metric_cell(by, one.estimates[name]) if name in one.estimates else Cell("–", key="n/a")
+                    for name, by in quantities.items()
+                ]
+                rows.append((*about, *cells, captures))
+    columns = ("dataset", "suite", "scoring", "rank", *(by.axis for by in quantities.values()), "captures")
     return Table("On each dataset", columns, tuple(rows))
 
 
@@ -254,14 +269,19 @@ def _others(content: Content, contender: Contender, sections: list[Section]) -> 
         ranking = section.main
         rows = []
         for one in ranking.standings:
-            for name in COMPARED:
+            for name in ranking.headline:
                 pair = ranking.pair(contender.key, one.contender.key, name)
                 if pair is None:
                     continue
                 word = VERDICTS[pair.verdict]
                 if pair.better is not None:
                     word = "better" if pair.better == contender.key else "worse"
-                cells = (Cell(quantity(name).title), pair_cell(pair), Cell(p_text(pair.adjusted)), Cell(word))
+                cells = (
+                    Cell(quantity(ranking, name).title),
+                    pair_cell(ranking, pair),
+                    Cell(p_value(pair.adjusted)),
+                    Cell(word),
+                )
                 rows.append((content.detector_cell(one), *cells, Cell(str(pair.captures))))
         columns = ("other detector", "metric", "difference: this one minus the other", "adjusted p", "this one is")
         yield Table(f"{section.title}, {ranking.board[2]} scoring", (*columns, "captures"), tuple(rows))
@@ -273,7 +293,7 @@ def _times(content: Content, mine: list[tuple[Suite, Contender]]) -> Table:
         for dataset in suite.datasets:
             for machine, speed in speeds_by_machine(suite, contender, dataset).items():
                 ratio = interval(speed.ratio, speed.low, speed.high, 3)
-                about = (line(machine), content.names.suite(suite), shown(dataset), shown(speed.reference))
+                about = (sentence(machine), content.names.suite(suite), shown(dataset), shown(speed.reference))
                 times = (
                     Cell(ratio, key=f"{speed.ratio:.6g}"),
                     Cell(number(speed.p50_us, 0)),
@@ -292,16 +312,16 @@ def _failures(mine: list[tuple[Suite, Contender]]) -> Table:
             reasons = [entry.reason] if entry.status == "failed" else []
             reasons += [f"{row['scoring']}: {row['reason']}" for row in entry.scores if row["status"] == "unscored"]
             about = (suite.name, entry.dataset, entry.capture, run.name)
-            rows += [tuple(Cell(line(text)) for text in (*about, reason)) for reason in reasons]
+            rows += [tuple(Cell(sentence(text)) for text in (*about, reason)) for reason in reasons]
     return Table("Failed or not scored", ("suite", "dataset", "capture", "run", "reason"), tuple(rows))
 
 
 def _notes(mine: list[tuple[Suite, Contender]]) -> Iterator[str]:
     for _, contender in mine:
-        yield from (line(text) for text in contender.disagreements)
+        yield from (sentence(text) for text in contender.disagreements)
         hard = contender.stability
         if hard is not None and "refused" in hard:
-            yield f"It refuses the capture of the hard cases: {line(hard['refused'])}"
+            yield f"It refuses the capture of the hard cases: {sentence(hard['refused'])}"
         elif hard is not None:
             yield (
                 f"Hard cases (SIMULATED): {hard['passed']} passed, {hard['failed']} failed, "
@@ -312,7 +332,7 @@ def _notes(mine: list[tuple[Suite, Contender]]) -> Iterator[str]:
 def _facts(mine: list[tuple[Suite, Contender]]) -> Iterator[tuple[str, str]]:
     contender = mine[0][1]
     newest = contender.runs[-1]
-    yield "name", line(contender.name)
+    yield "name", sentence(contender.name)
     yield "identity", contender.identity
     yield "fidelity", str(contender.config["fidelity"])
     yield "runs", ", ".join(dict.fromkeys(shown(run.name) for _, one in mine for run in one.runs))
@@ -334,7 +354,7 @@ def _runs(content: Content) -> Page:
             shown(run.name),
             content.names.suite(suite),
             run.started,
-            "; ".join(line(machine) for machine in run.machines),
+            "; ".join(sentence(machine) for machine in run.machines),
             f"uwbbench {shown(versions['uwbbench'])}, numpy {shown(versions['numpy'])}",
             str(len(run.manifest["detectors"])),
             f"{len(run.entries) - failed} done, {failed} failed",
@@ -343,7 +363,7 @@ def _runs(content: Content) -> Page:
         rows.append(tuple(map(Cell, cells)))
     columns = ("run", "suite", "started", "machine", "versions", "detectors", "units", "verified")
     failures = [
-        tuple(Cell(line(text)) for text in (run.name, entry.kind, entry.detector, entry.dataset, entry.reason))
+        tuple(Cell(sentence(text)) for text in (run.name, entry.kind, entry.detector, entry.dataset, entry.reason))
         for run in content.runs
         for entry in run.entries
         if entry.status == "failed" and entry.kind != "accuracy"
@@ -357,4 +377,4 @@ def _runs(content: Content) -> Page:
         "Every run was verified before anything was taken from it: files against their hashes, names and identities "
         "against the manifest, scores against the stored detections. Detections themselves are taken as they are."
     )
-    return Page("runs.html", "Runs", _badge({one.source for one in content.sections}), lead, parts)
+    return Page("runs.html", "Runs", badge({one.source for one in content.sections}), lead, parts)

@@ -11,17 +11,19 @@ Conventions
 
 from __future__ import annotations
 
-import csv
-import io
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import pandas as pd
+
 from uwbbench.api.errors import StoreError
+from uwbbench.api.text import one_line
 from uwbbench.results.report import Report
 from uwbbench.run.folder.files import write_json, write_text
 from uwbbench.run.folder.identity import plain
+from uwbbench.show.extras import report_tools
 from uwbbench.show.text.report import sheets
 from uwbbench.show.text.sheet import Sheet
 
@@ -105,11 +107,8 @@ def _csv_tables(report: Report) -> dict[str, list[dict[str, Any]]]:
 
 def _csv(rows: Sequence[Mapping[str, Any]]) -> str:
     columns = list(dict.fromkeys(name for row in rows for name in row))
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(columns)
-    writer.writerows([_cell(row.get(name)) for name in columns] for row in rows)
-    return text.getvalue()
+    cells = [[_cell(row.get(name)) for name in columns] for row in rows]
+    return str(pd.DataFrame(cells, columns=columns).to_csv(index=False, lineterminator="\n"))
 
 
 def _cell(value: Any) -> str:
@@ -122,36 +121,27 @@ def _cell(value: Any) -> str:
 
 
 def latex(report: Report) -> str:
-    """Every table for LaTeX; the preamble needs ``booktabs``, ``textcomp`` and T1 fonts."""
-    lines = [
-        f"% {MARK}; needs \\usepackage{{booktabs}} and \\usepackage[T1]{{fontenc}}",
-        *(_latex_table(sheet) for sheet in sheets(report)),
-    ]
-    return "\n".join(lines) + "\n"
+    """Every table for LaTeX; the preamble needs ``booktabs``, ``textcomp`` and T1 fonts.
+
+    Raises
+    ------
+    ReportToolsError
+        If Jinja2, which pandas writes tables with, is not installed.
+    """
+    with report_tools():
+        tables = [_latex_table(sheet) for sheet in sheets(report)]
+    return "\n".join((f"% {MARK}; needs \\usepackage{{booktabs}} and \\usepackage[T1]{{fontenc}}", *tables, ""))
 
 
 def _latex_table(sheet: Sheet) -> str:
-    rows = [_latex_row(row) for row in sheet.rows] or ["None." + " &" * (len(sheet.columns) - 1) + r" \\"]
+    empty = ("None.", *[""] * (len(sheet.columns) - 1))
+    rows = [[latex_escaped(cell) for cell in row] for row in sheet.rows or (empty,)]
+    table = pd.DataFrame(rows, columns=[latex_escaped(name) for name in sheet.columns])
+    # Escaped here: pandas lets quotes, ligatures and brackets behind a line break through.
+    tabular = table.to_latex(index=False, escape=False, column_format=f"l{'r' * (len(sheet.columns) - 1)}")
     notes = [rf"\par\footnotesize {latex_escaped(note)}" for note in sheet.notes]
-    lines = [
-        r"\begin{table*}",
-        r"\centering\small",
-        rf"\caption{{{latex_escaped(sheet.title)}}}",
-        rf"\begin{{tabular}}{{l{'r' * (len(sheet.columns) - 1)}}}",
-        r"\toprule",
-        _latex_row(sheet.columns),
-        r"\midrule",
-        *rows,
-        r"\bottomrule",
-        r"\end{tabular}",
-        *notes,
-        r"\end{table*}",
-    ]
-    return "\n".join(lines) + "\n"
-
-
-def _latex_row(cells: Iterable[str]) -> str:
-    return " & ".join(latex_escaped(cell) for cell in cells) + r" \\"
+    head = (r"\begin{table*}", r"\centering\small", rf"\caption{{{latex_escaped(sheet.title)}}}")
+    return "\n".join((*head, tabular.rstrip(), *notes, r"\end{table*}", ""))
 
 
 def latex_escaped(text: str) -> str:
@@ -162,7 +152,7 @@ def latex_escaped(text: str) -> str:
     >>> print(latex_escaped("50 % of a_b -- [x]"))
     50 \% of a\_b -{}- [x]
     """
-    line = "".join(_LATEX.get(char, char) for char in " ".join(text.split())).replace("--", "-{}-")
+    line = "".join(_LATEX.get(char, char) for char in one_line(text)).replace("--", "-{}-")
     return f"{{}}{line}" if line[:1] in ("[", "*") else line  # behind a line break these would be its options
 
 

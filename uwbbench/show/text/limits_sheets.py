@@ -6,7 +6,8 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 from uwbbench.results.limits import BLIND_UP_TO_M, CLEAR_M, GATE_M, Limits
-from uwbbench.show.text.sheet import Sheet, interval, number, shown
+from uwbbench.show.text.numbers import interval, number
+from uwbbench.show.text.sheet import Sheet, shown
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -117,5 +118,6 @@ def _false_alarms(table: pd.DataFrame) -> Sheet:
     notes = (
         "Detections a tap of noise alone. Only CFAR stages ask for a rate, and they mean it for 'all' cells over their "
         "threshold and, unless told otherwise, for independent noise; this noise is correlated.",
+        "95 % intervals over frames: alarms in cells of one frame come together.",
     )
     return Sheet(f"{_TITLE}: false alarms", columns, tuple(rows), notes)

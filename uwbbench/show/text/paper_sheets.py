@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING
 
 from uwbbench.results import published
-from uwbbench.show.text.sheet import Sheet, interval, number, shown
-from uwbbench.show.text.wording import TABLES, TITLES, scale
+from uwbbench.show.text.numbers import interval, number
+from uwbbench.show.text.quantity import Quantity
+from uwbbench.show.text.sheet import Sheet, shown
+from uwbbench.show.text.wording import TABLES
 
 if TYPE_CHECKING:
     from uwbbench.results.report import Report
 
-_METRICS = ("mae", "p90", "p95", "sd", "precision", "recall", "f1")
 _UNKNOWN = "not known"
 
 
@@ -21,8 +22,8 @@ def paper_sheets(report: Report) -> Iterator[Sheet]:
     table = report.paper_tables
     if table.empty:
         return
-    units = {name: scale(report.metrics[name].unit) for name in _METRICS}
-    heads = tuple(TITLES[name] + units[name][0] for name in _METRICS)
+    quantities = Quantity.of_all(report.metrics.brief)
+    heads = tuple(by.axis for by in quantities.values())
     for kind in table["table"].unique():
         rows = [
             (
@@ -32,15 +33,18 @@ def paper_sheets(report: Report) -> Iterator[Sheet]:
                 number(row["channel"], 0),
                 shown(row["material"]),
                 row["source"],
-                *(interval(row[name], row[f"{name}_low"], row[f"{name}_high"], *units[name][1:]) for name in _METRICS),
-                str(row["mae_n"]),
+                *(
+                    interval(row[name], row[f"{name}_low"], row[f"{name}_high"], by.digits, by.factor)
+                    for name, by in quantities.items()
+                ),
+                str(row["errors"]),
                 str(row["frames"]),
             )
             for row in table[table["table"] == kind].to_dict("records")
         ]
         notes: tuple[str, ...] = ()
         if report.repeats_the_paper:
-            rows = sorted([*rows, *_published(kind, units)], key=lambda row: row[3:5])  # channel, then material
+            rows = sorted([*rows, *_published(kind, quantities)], key=lambda row: row[3:5])  # channel, then material
             notes = (f"'{_UNKNOWN}': the figure of {published.NAME} could not be read.", *published.NOTES[kind])
         columns = ("detector", "scoring", "dataset", "channel", "material", "source", *heads, "n", "frames")
         yield Sheet(f"By channel and material, {TABLES[kind]}", columns, tuple(rows), notes)
@@ -48,10 +52,10 @@ def paper_sheets(report: Report) -> Iterator[Sheet]:
         yield _chain(report)
 
 
-def _published(kind: str, units: dict[str, tuple[str, int, float]]) -> Iterator[tuple[str, ...]]:
+def _published(kind: str, quantities: Mapping[str, Quantity]) -> Iterator[tuple[str, ...]]:
     for channel, material in published.ROWS:
-        found = [(published.known(kind, channel, material, name), units[name]) for name in _METRICS]
-        cells = [_UNKNOWN if value is None else number(value, digits + 1, by) for value, (_, digits, by) in found]
+        figures = [(published.known(kind, channel, material, name), by) for name, by in quantities.items()]
+        cells = [_UNKNOWN if value is None else number(value, by.digits + 1, by.factor) for value, by in figures]
         yield published.NAME, "peak", "its recordings", str(channel), material, "published", *cells, _UNKNOWN, _UNKNOWN
 
 
@@ -61,7 +65,7 @@ def _chain(report: Report) -> Sheet:
     rows = []
     for (detector, dataset), group in counts.groupby(["detector", "dataset"], sort=False):
         left = dict(zip(group["step"], group["count"], strict=True))
-        if steps["peaks"] in left:
+        if next(iter(steps.values())) in left:
             rows.append(
                 (shown(str(detector)), shown(str(dataset)), *(str(left.get(step, "n/a")) for step in steps.values()))
             )

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from uwbbench.api.metric import Metric
 from uwbbench.measure.accuracy.stats import Estimate
-from uwbbench.show.text.sheet import interval
-from uwbbench.show.text.wording import TITLES, scale
+from uwbbench.show.text.numbers import interval, number
 
 
 @dataclass(frozen=True)
@@ -39,9 +39,14 @@ class Quantity:
     @classmethod
     def of(cls, name: str, metric: type[Metric]) -> Quantity:
         """How a registered metric is shown."""
-        unit, digits, factor = scale(metric.unit)
+        unit, factor, digits = metric.scale()
         samples = "detections" if metric.merge == "stack" else "frames"
-        return cls(name, TITLES.get(name, name), unit.strip(" ()"), digits, factor, metric.better, samples)
+        return cls(name, metric.title or name, unit, digits, factor, metric.better, samples)
+
+    @classmethod
+    def of_all(cls, metrics: Mapping[str, type[Metric]]) -> dict[str, Quantity]:
+        """How each of some metrics is shown, by name."""
+        return {name: cls.of(name, metric) for name, metric in metrics.items()}
 
     @property
     def axis(self) -> str:
@@ -51,6 +56,10 @@ class Quantity:
     def scaled(self, value: float) -> float:
         """Value in the shown unit."""
         return value * self.factor
+
+    def text(self, value: float) -> str:
+        """Value with unit."""
+        return f"{number(value, self.digits, self.factor)} {self.unit}".strip()
 
     def value_of(self, estimate: Estimate) -> str:
         """Value with unit and interval."""
@@ -62,3 +71,9 @@ class Quantity:
         if math.isnan(estimate.value):
             return "undefined"
         return f"{self.value_of(estimate)}, n = {estimate.n} {self.samples}, {estimate.groups} groups"
+
+
+def undefined_titles(metrics: Mapping[str, type[Metric]]) -> str:
+    """Titles, as words of a sentence, of the metrics that are undefined where the truth is not exhaustive."""
+    titles = [metric.title or name for name, metric in metrics.items() if metric.needs_exhaustive_truth]
+    return " and ".join(part for part in (", ".join(titles[:-1]), *titles[-1:]) if part)

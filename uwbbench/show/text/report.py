@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+from uwbbench.api.text import one_line
+from uwbbench.measure.accuracy.metrics.choice import MetricChoice
 from uwbbench.measure.accuracy.stats import MINIMUM_GROUPS
 from uwbbench.results.report import Report
 from uwbbench.show.text.limits_sheets import limits_sheets
+from uwbbench.show.text.numbers import interval, number
 from uwbbench.show.text.paper_sheets import paper_sheets
-from uwbbench.show.text.sheet import Sheet, escaped, interval, number, shown
-from uwbbench.show.text.wording import TABLES, TITLES, scale
-
-LONGEST_LINE = 600
+from uwbbench.show.text.quantity import Quantity, undefined_titles
+from uwbbench.show.text.sheet import Sheet, escaped, sentence, shown
+from uwbbench.show.text.wording import TABLES
 
 
 def sheets(report: Report) -> list[Sheet]:
@@ -60,20 +62,20 @@ class Tables:
         """What was compared on, with licence."""
         keys = ("dataset", "capture", "source", "frames", "license", "description")
         if self._report.captures:
-            rows = tuple(tuple(_line(str(one[key])) for key in keys) for one in self._report.captures)
+            rows = tuple(tuple(sentence(str(one[key])) for key in keys) for one in self._report.captures)
             yield Sheet("Captures", keys, rows)
 
     def failed(self) -> Iterator[Sheet]:
         """What did not run, and what could not be scored, with reasons."""
         if self._report.failures:
             failed = tuple(
-                (str(e.kind), shown(e.detector), shown(e.dataset), shown(e.capture), _line(e.reason))
+                (str(e.kind), shown(e.detector), shown(e.dataset), shown(e.capture), sentence(e.reason))
                 for e in self._report.failures
             )
             yield Sheet("Failed", ("what", "detector", "dataset", "capture", "reason"), failed)
         if self._report.unscored:
             rows = tuple(
-                (shown(e.detector), shown(e.capture), scoring, _line(reason))
+                (shown(e.detector), shown(e.capture), scoring, sentence(reason))
                 for e, scoring, reason in self._report.unscored
             )
             yield Sheet("Not scored", ("detector", "capture", "scoring", "reason"), rows)
@@ -84,10 +86,10 @@ def markdown(report: Report) -> str:
     name, about = report.experiment["name"], report.experiment["description"]
     lines = ["<!-- uwbbench report -->", f"# {escaped(shown(name))}", ""]
     if about:
-        lines += [escaped(" ".join(about.split())), ""]
+        lines += [escaped(one_line(about)), ""]
     lines += [sheet.markdown() for sheet in sheets(report)]
     if report.notes:
-        lines += ["## Notes", "", *(f"* {escaped(_line(note))}" for note in report.notes), ""]
+        lines += ["## Notes", "", *(f"* {escaped(sentence(note))}" for note in report.notes), ""]
     session = report.folder.manifest["sessions"][-1]
     machine, versions = session["machine"], session["versions"]
     made = f"uwbbench {versions['uwbbench']}, Python {versions['python']}, {machine['cpu']}, {machine['os']}"
@@ -100,48 +102,50 @@ def write_report(report: Report) -> Path:
     return report.folder.write_text("report.md", markdown(report))
 
 
-def _line(text: str) -> str:
-    """Text on one line, without control characters, cut where it is very long."""
-    line = "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in " ".join(text.split()))
-    return line if len(line) <= LONGEST_LINE else f"{line[:LONGEST_LINE]}..."
-
-
 def _leaderboards(report: Report) -> Iterator[Sheet]:
     """One sheet for each dataset, source, scoring and table."""
-    units = {name: metric.unit for name, metric in report.metrics.items()} | {"matched_mae": "m"}
+    quantities = Quantity.of_all(report.metrics)
     groups: dict[tuple[str, ...], list[tuple[dict[str, Any], Any]]] = {}
-    for about, found in report.estimates:
+    for about, estimates in report.estimates:
         key = about["dataset"], about["source"], about["scoring"], about["table"]
-        groups.setdefault(key, []).append((about, found))
+        groups.setdefault(key, []).append((about, estimates))
     for (dataset, source, scoring, table), members in groups.items():
         open_world = any(not about["exhaustive"] for about, _ in members)
-        hidden = ("precision", "f1", "false_alarms_per_minute") if open_world else ()
-        names = [name for name in members[0][1] if name not in hidden]
-        heads = [TITLES.get(name, name) + scale(units[name])[0] for name in names]
+        columns = [quantities[name] for name in report.metrics.defined(exhaustive=not open_world)]
+        heads = [by.axis for by in columns]
         extra = (["chance recall"] if open_world else []) + ["n", "frames", "p50 (us)", "p99 (us)"]
         rows = []
-        for about, found in members:
-            cells = [interval(e.value, e.low, e.high, *scale(units[name])[1:]) for name in names for e in [found[name]]]
+        for about, estimates in members:
+            shown_here = [(estimates[by.name], by) for by in columns]
+            cells = [interval(e.value, e.low, e.high, by.digits, by.factor) for e, by in shown_here]
             cells += [number(about["chance_recall"], 3)] if open_world else []
             frames = f"{about['scored_frames']} of {about['frames']}"
-            cells += [str(found["mae"].n), frames, number(about["p50_us"], 0), number(about["p99_us"], 0)]
+            cells += [str(about["errors"]), frames, number(about["p50_us"], 0), number(about["p99_us"], 0)]
             rows.append((shown(about["detector"]), *cells))
         title = f"{shown(dataset)}, {source.upper()}: {scoring} scoring, {TABLES[table]}"
-        yield Sheet(title, ("detector", *heads, *extra), tuple(rows), tuple(_leaderboard_notes(members, open_world)))
+        notes = tuple(_leaderboard_notes(members, quantities, report.metrics))
+        yield Sheet(title, ("detector", *heads, *extra), tuple(rows), notes)
 
 
-def _leaderboard_notes(members: list[tuple[dict[str, Any], Any]], open_world: bool) -> Iterator[str]:
+def _leaderboard_notes(
+    members: list[tuple[dict[str, Any], Any]], quantities: Mapping[str, Quantity], metrics: MetricChoice
+) -> Iterator[str]:
+    open_world = any(not about["exhaustive"] for about, _ in members)
+    main = quantities[metrics.ranking(exhaustive=not open_world)]
     yield "Errors are those of all retained detections; 'of matches' counts true positives only: read it with recall."
+    if metrics.listed:
+        yield f"Ranked by {main.title}."
     if open_world:
         yield (
-            "The truth does not name all that is visible, so an unmatched detection proves nothing: precision and F1 "
-            "are undefined; errors are of matches, and recall is to be read against that of random ranges."
+            "The truth does not name all that is visible, so an unmatched detection proves nothing: "
+            f"{undefined_titles(metrics)} are undefined; errors are of matches, and recall is to be read against that "
+            "of random ranges."
         )
-    if all(estimate["recall"].groups < MINIMUM_GROUPS for _, estimate in members):
+    if all(estimates[main.name].groups < MINIMUM_GROUPS for _, estimates in members):
         yield f"No intervals: fewer than {MINIMUM_GROUPS} groups (captures, or blocks of a second)."
-        for about, found in members:
-            values = ", ".join(number(value, 3) for value in found["recall"].per_group)
-            yield f"Recall of each group, {shown(about['detector'])}: {values or 'none'}"
+        for about, estimates in members:
+            values = ", ".join(number(value, main.digits, main.factor) for value in estimates[main.name].per_group)
+            yield f"{main.axis} of each group, {shown(about['detector'])}: {values or 'none'}"
     for about, _ in members:
         if about["invalid"] or about["unprocessed"]:
             yield (
@@ -160,13 +164,13 @@ def _stability(report: Report) -> Sheet:
         name = shown(one["detector"])
         if "refused" in one:
             rows.append((name, *["n/a"] * (len(columns) - 1)))
-            notes.append(f"{name} cannot run on the capture of the hard cases: {_line(one['refused'])}")
+            notes.append(f"{name} cannot run on the capture of the hard cases: {sentence(one['refused'])}")
             continue
         counts = [str(one[key]) for key in ("passed", "failed", "not_applicable")]
         sizes = ["n/a" if one[key] is None else f"{one[key]:.1e}" for key in ("largest_error_m", "largest_error_ulp")]
         flips = [number(one[key], 2, 100.0) for key in ("flips_float32", "flips_one_ulp")]
         rows.append((name, number(one["usual_hits"], 0, 100.0), *counts, *sizes, *flips))
-        failed = [f"{case['case']} ({_line(case['detail'])})" for case in one["cases"] if case["status"] == "failed"]
+        failed = [f"{case['case']} ({sentence(case['detail'])})" for case in one["cases"] if case["status"] == "failed"]
         notes += [f"{name} failed: {shown('; '.join(failed))}"] if failed else []
     about = (
         "Inputs at which numerical code breaks, made by uwbbench and SIMULATED; 'uwbbench stability' tells each case."

@@ -1,12 +1,13 @@
-"""A table of texts, and how numbers and names become texts."""
+"""A table of texts, and how names become texts."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-LONGEST_NAME = 60
+from uwbbench.api.text import one_line, printable
+
+LONGEST_NAME, LONGEST_SENTENCE = 60, 600
 _MARKDOWN = str.maketrans({char: f"\\{char}" for char in "\\`*_[]|~#"})
 _HTML = str.maketrans({"&": "&amp;", "<": "&lt;", ">": "&gt;"})
 
@@ -52,8 +53,12 @@ def escaped(text: str) -> str:
 
 def shown(name: str) -> str:
     """Name on one line, without control characters, cut where it is very long."""
-    text = "".join(char if char.isprintable() else char.encode("unicode_escape").decode() for char in name)
-    return text if len(text) <= LONGEST_NAME else f"{text[: LONGEST_NAME - 3]}..."
+    return printable(name, LONGEST_NAME)
+
+
+def sentence(text: str) -> str:
+    """Text on one line, without control characters, cut where it is very long."""
+    return one_line(text, LONGEST_SENTENCE)
 
 
 def labels(names: Iterable[str], longest: int = 28) -> dict[str, str]:
@@ -66,30 +71,9 @@ def labels(names: Iterable[str], longest: int = 28) -> dict[str, str]:
     """
     found: dict[str, str] = {}
     for name in dict.fromkeys(names):
-        text = shown(name).strip() or "(no name)"
-        short = text if len(text) <= longest else f"{text[: longest - 1]}…"
+        short = printable(name.strip(), longest) or "(no name)"
         label, copy = short, 2
         while label in found.values():
             label, copy = f"{short} ({copy})", copy + 1
         found[name] = label
     return found
-
-
-def number(value: object, digits: int, scale: float = 1.0) -> str:
-    """Number with fixed digits; ``n/a`` where it is undefined.
-
-    Examples
-    --------
-    >>> number(0.1234, 1, 100.0), number(None, 2), number(float("nan"), 2)
-    ('12.3', 'n/a', 'n/a')
-    """
-    if not isinstance(value, int | float) or not math.isfinite(value):
-        return "n/a"
-    return f"{value * scale:.{digits}f}"
-
-
-def interval(value: object, low: object, high: object, digits: int, scale: float = 1.0) -> str:
-    """Number with its interval in brackets, where there is one."""
-    text = number(value, digits, scale)
-    ends = number(low, digits, scale), number(high, digits, scale)
-    return text if "n/a" in (text, *ends) else f"{text} [{ends[0]}, {ends[1]}]"

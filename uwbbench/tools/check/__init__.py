@@ -1,17 +1,5 @@
 """Conformance checks of plugins: what every stage, detector, dataset and metric must do, each with a name."""
 
-from uwbbench.tools.check.check import KINDS, Check, Kind, Result
 from uwbbench.tools.check.suite import Conformance, all_checks, checks_for, examine, kinds_of, subject_of
 
-__all__ = [
-    "KINDS",
-    "Check",
-    "Conformance",
-    "Kind",
-    "Result",
-    "all_checks",
-    "checks_for",
-    "examine",
-    "kinds_of",
-    "subject_of",
-]
+__all__ = ["Conformance", "all_checks", "checks_for", "examine", "kinds_of", "subject_of"]

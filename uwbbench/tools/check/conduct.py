@@ -12,7 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from uwbbench.tools.check.check import Nonconformity, NotApplicable, check
+from uwbbench.api.case import NotApplicable
+from uwbbench.tools.check.check import Nonconformity, check
 from uwbbench.tools.check.subject import Subject
 from uwbbench.tools.check.values import read_only, same
 

@@ -12,25 +12,28 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from uwbbench.api import registry
 from uwbbench.api.capture import Capture
 from uwbbench.api.capture_file import open_capture, write_capture
+from uwbbench.api.case import NotApplicable, last_line
 from uwbbench.api.dataset import Card, Dataset
 from uwbbench.api.errors import CaptureError
 from uwbbench.api.frames import Frames
+from uwbbench.api.registry import AuthoredKind
 from uwbbench.detect.pipeline import detector_from_yaml
-from uwbbench.tools.check.check import Kind, Nonconformity, NotApplicable, check, last_line
+from uwbbench.tools.check.check import Nonconformity, check
 from uwbbench.tools.check.params import working_params
 from uwbbench.tools.check.subject import ClassSubject
 from uwbbench.tools.check.values import Values, same
 
 _CARD, _DATASET, _CAPTURE = "uwbbench.api.dataset.Card", "uwbbench.api.dataset.Dataset", "uwbbench.api.capture.Capture"
-_ONE_A_FRAME = "schema: 1\nname: constant\npipeline:\n  - {use: reference.constant}\n"
+_ONE_A_FRAME = "schema: 1\nname: constant\npipeline:\n  - {{use: {}}}\n"
 
 
 class DatasetSubject(ClassSubject):
     """One dataset adapter, and the first of its captures."""
 
-    kind: ClassVar[Kind] = "dataset"
+    kind: ClassVar[AuthoredKind] = "dataset"
     base: ClassVar[type] = Dataset
 
     @cached_property
@@ -269,7 +272,7 @@ def capture_can_be_kept(subject: DatasetSubject) -> None:
 def detectors_take_it(subject: DatasetSubject) -> str:
     """A detector that answers in every frame without looking does so on the first capture."""
     capture = subject.capture
-    found = detector_from_yaml(_ONE_A_FRAME).run(capture)
+    found = detector_from_yaml(_ONE_A_FRAME.format(registry.default("stage.constant"))).run(capture)
     expected = int(capture.frames().valid.sum())
     if len(found) != expected:
         raise Nonconformity(f"{expected} detections, one for each valid frame", str(len(found)))

@@ -9,11 +9,12 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, TypeAdapter, ValidationError
 
+from uwbbench.api.case import NotApplicable
 from uwbbench.api.check import checked
 from uwbbench.api.errors import ConfigError
 from uwbbench.api.stage import Params, describe
 from uwbbench.api.yaml_file import parse_yaml
-from uwbbench.tools.check.check import Nonconformity, NotApplicable, check
+from uwbbench.tools.check.check import Nonconformity, check
 from uwbbench.tools.check.params import working_params
 from uwbbench.tools.check.subject import ClassSubject
 

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+import statistics
+import time
+from collections.abc import Callable, Sequence
 from functools import cache
 from itertools import pairwise
 from typing import Any
@@ -15,7 +17,7 @@ from uwbbench.api.capture import Capture
 from uwbbench.api.frames import Frames
 from uwbbench.measure.robustness.scene import altered, approach
 
-FRAMES = 128
+FRAMES, CALLS = 128, 60
 INVALID, ZERO, LOUD = (5, 40, 41), 11, 17
 """Frames with a sample that is not finite, of zeros, and a thousand times stronger."""
 CUTS: dict[str, tuple[int, ...]] = {
@@ -25,6 +27,16 @@ CUTS: dict[str, tuple[int, ...]] = {
     "halves with an empty block between": (FRAMES // 2, FRAMES // 2),
     "uneven blocks": (3, 4, 50, 51, 100, 127),
 }
+
+
+def call_s(step: Callable[[Any], object], calls: Sequence[Any]) -> float:
+    """Median time of a call for one frame, after the first third of the calls, which load and compile."""
+    times = []
+    for frame in calls:
+        start = time.perf_counter()
+        step(frame)
+        times.append(time.perf_counter() - start)
+    return statistics.median(times[len(times) // 3 :])
 
 
 @cache

@@ -12,8 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uwbbench.api.metric import Metric, Outcome
+from uwbbench.api.registry import AuthoredKind
 from uwbbench.measure.accuracy.stats import bootstrap, evaluate, merge
-from uwbbench.tools.check.check import Kind, Nonconformity, check
+from uwbbench.tools.check.check import Nonconformity, check
 from uwbbench.tools.check.subject import ClassSubject
 from uwbbench.tools.check.values import Values
 
@@ -55,7 +56,7 @@ def empty() -> Outcome:
 class MetricSubject(ClassSubject):
     """One metric, and outcomes of twelve captures."""
 
-    kind: ClassVar[Kind] = "metric"
+    kind: ClassVar[AuthoredKind] = "metric"
     base: ClassVar[type] = Metric
 
     @cached_property
@@ -97,6 +98,40 @@ def attributes_are_valid(subject: MetricSubject) -> str:
     if not isinstance(least, int) or least < 1:
         raise Nonconformity("minimum_samples of 1 or more", repr(least))
     return f"{subject.cls.merge}, {subject.cls.better} is better"
+
+
+@check(_METRIC)
+def display_is_valid(subject: MetricSubject) -> str:
+    """What tables and rankings read is of the kind that they expect: title, decimals, order, headline, margin."""
+    cls = subject.cls
+    if not isinstance(cls.title, str) or not cls.title.isprintable():
+        raise Nonconformity("title as text on one line", repr(cls.title))
+    shown = cls.shown_as
+    if shown is not None and not (isinstance(shown, tuple) and len(shown) == 3):
+        raise Nonconformity("shown_as as (unit, factor, decimals), or None", repr(shown))
+    unit, factor, decimals = cls.scale()
+    if not isinstance(unit, str) or not unit.isprintable():
+        raise Nonconformity("a unit in shown_as as text on one line", repr(unit))
+    if not _is_number(factor) or factor <= 0:
+        raise Nonconformity("a factor above 0 in shown_as", repr(factor))
+    if not _is_whole(decimals) or not 0 <= decimals <= 9:
+        raise Nonconformity("0 to 9 decimals in shown_as", repr(decimals))
+    if not _is_whole(cls.order) or not (cls.headline is None or _is_whole(cls.headline)):
+        raise Nonconformity("order and headline as whole numbers, or headline None", f"{cls.order!r}, {cls.headline!r}")
+    if not _is_number(cls.margin) or cls.margin < 0:
+        raise Nonconformity("a margin of 0 or more", repr(cls.margin))
+    for name in ("default", "brief", "needs_exhaustive_truth"):
+        if not isinstance(getattr(cls, name), bool):
+            raise Nonconformity(f"{name} as True or False", repr(getattr(cls, name)))
+    return f"{cls.title or 'its registered name'}, {decimals} decimals {unit}".rstrip()
+
+
+def _is_whole(value: object) -> bool:
+    return isinstance(value, int) and not isinstance(value, bool)
+
+
+def _is_number(value: object) -> bool:
+    return _is_whole(value) or (isinstance(value, float) and math.isfinite(value))
 
 
 @check(_METRIC)
@@ -175,7 +210,7 @@ def perfection_is_best(subject: MetricSubject) -> str:
     others = {name: evaluate(cls, [outcome(1, **how)]) for name, how in flaws.items()}
     if not math.isfinite(best):
         raise Nonconformity("a number for a perfect detector", str(best))
-    beaten = {name: _merit(cls, best) - _merit(cls, value) for name, value in others.items()}
+    beaten = {name: cls.merit(best) - cls.merit(value) for name, value in others.items()}
     wrong = next((name for name, lead in beaten.items() if lead < -1e-12), None)
     if wrong:
         told = f"perfect {best:g}, one that {wrong} {others[wrong]:g}, and {cls.better} is better"
@@ -183,11 +218,6 @@ def perfection_is_best(subject: MetricSubject) -> str:
     if not any(lead > 0 for lead in beaten.values()):
         raise Nonconformity("a worse value for some flaw", f"{best:g} for all of {', '.join(others)}")
     return f"perfect: {best:g}"
-
-
-def _merit(cls: type[Metric], value: float) -> float:
-    """Larger for what is better."""
-    return {"higher": value, "lower": -value, "zero": -abs(value)}[cls.better]
 
 
 @check("uwbbench.measure.accuracy.stats.bootstrap")
@@ -226,13 +256,17 @@ def errors_that_are_nan_are_left_out(subject: MetricSubject) -> None:
 
 @check("uwbbench.api.metric.Outcome")
 def open_truth_is_fine(subject: MetricSubject) -> str:
-    """Captures whose truth is not exhaustive come through; what an unmatched detection would decide is undefined."""
+    """Captures whose truth is not exhaustive come through; a metric that is undefined there says so, and no other."""
     value = evaluate(subject.cls, [dataclasses.replace(one, exhaustive=False) for one in subject.outcomes])
+    if subject.cls.needs_exhaustive_truth != math.isnan(value):
+        told = f"needs_exhaustive_truth = {subject.cls.needs_exhaustive_truth}"
+        raise Nonconformity(f"needs_exhaustive_truth = {math.isnan(value)}, as the value is {value:.4g} there", told)
     return f"{value:.4g}"
 
 
 CHECKS = (
     attributes_are_valid,
+    display_is_valid,
     unit_is_given,
     partials_are_flat_arrays,
     value_is_a_float,

@@ -11,13 +11,13 @@ from typing import Any
 from pydantic import ValidationError
 
 from uwbbench.api import registry
+from uwbbench.api.case import NotApplicable
 from uwbbench.api.check import checked
 from uwbbench.api.errors import UwbbenchError
 from uwbbench.api.locate import shipped
 from uwbbench.api.stage import Params
 from uwbbench.api.yaml_file import YamlFile
 from uwbbench.config.detector import Step, read_detector
-from uwbbench.tools.check.check import NotApplicable
 
 CHANNEL = 9
 """Channel of the capture that plugins are tried on."""

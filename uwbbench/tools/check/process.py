@@ -9,7 +9,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from uwbbench.tools.check.check import last_line
+from uwbbench.api.case import last_line
 from uwbbench.tools.check.subject import Subject
 
 HASH_SEED = "20251201"

@@ -6,7 +6,8 @@ import ast
 from collections.abc import Iterator
 from pathlib import Path
 
-from uwbbench.tools.check.check import Nonconformity, NotApplicable, check
+from uwbbench.api.case import NotApplicable
+from uwbbench.tools.check.check import Nonconformity, check
 from uwbbench.tools.check.subject import ClassSubject
 
 HEAVY = ("scipy.signal", "scipy.stats", "sklearn", "numba", "pandas", "matplotlib", "torch", "tensorflow")

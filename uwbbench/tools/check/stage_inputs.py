@@ -10,9 +10,10 @@ from typing import Any
 import numpy as np
 
 from uwbbench.api.capture import Capture
+from uwbbench.api.case import NotApplicable
 from uwbbench.api.errors import UwbbenchError
 from uwbbench.measure.robustness.scene import altered, approach, chosen
-from uwbbench.tools.check.check import Nonconformity, NotApplicable, check
+from uwbbench.tools.check.check import Nonconformity, check
 from uwbbench.tools.check.inputs import FRAMES
 from uwbbench.tools.check.stage_subject import StageSubject, behind_all
 from uwbbench.tools.check.values import Values, same

@@ -7,8 +7,9 @@ import typing
 import numpy as np
 
 from uwbbench.api.block import Block
+from uwbbench.api.case import NotApplicable, last_line
 from uwbbench.api.stage import Filter
-from uwbbench.tools.check.check import Nonconformity, NotApplicable, check, last_line
+from uwbbench.tools.check.check import Nonconformity, check
 from uwbbench.tools.check.stage_subject import PARTS, StageSubject, lacking
 from uwbbench.tools.check.values import Values, difference, of_blocks
 

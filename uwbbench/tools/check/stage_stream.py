@@ -2,20 +2,15 @@
 
 from __future__ import annotations
 
-import statistics
-import time
-from typing import Any
-
 import numpy as np
 
 from uwbbench.api import registry
-from uwbbench.api.stage import Stage
-from uwbbench.tools.check.check import Nonconformity, NotApplicable, check
-from uwbbench.tools.check.inputs import CUTS, cut, pieces
+from uwbbench.api.case import NotApplicable
+from uwbbench.tools.check.check import Nonconformity, check
+from uwbbench.tools.check.inputs import CALLS, CUTS, call_s, cut, pieces
 from uwbbench.tools.check.stage_subject import StageSubject
 from uwbbench.tools.check.values import Values, of_blocks, same
 
-CALLS = 60
 _STAGE = "uwbbench.api.stage.Stage"
 
 
@@ -74,25 +69,15 @@ def one_frame_is_in_time(subject: StageSubject) -> str:
 
     The number is rough; ``uwbbench time`` measures properly.
     """
-    own_s, period_s = _call_s(subject.opened(), subject), 1 / subject.capture.radar.frame_rate_hz
+    blocks = pieces(subject.block, CUTS["single frames"])[:CALLS]
+    own_s, period_s = call_s(subject.opened().step, blocks), 1 / subject.capture.radar.frame_rate_hz
     told = f"{own_s * 1e6:.0f} us a call"
-    if "reference.nothing" in registry.entries("stages"):
-        nothing = StageSubject("reference.nothing").opened()
-        told += f", {own_s / _call_s(nothing, subject):.1f} times doing nothing"
+    if "stage.idle" in registry.entries("defaults"):
+        nothing = StageSubject(registry.default("stage.idle")).opened()
+        told += f", {own_s / call_s(nothing.step, blocks):.1f} times doing nothing"
     if own_s > period_s:
         raise Nonconformity(f"a call for one frame within {period_s * 1e3:.1f} ms", told)
     return told
-
-
-def _call_s(stage: Stage[Any], subject: StageSubject) -> float:
-    """Median time of a call for one frame."""
-    blocks = pieces(subject.block, CUTS["single frames"])[:CALLS]
-    times = []
-    for block in blocks:
-        start = time.perf_counter()
-        stage.step(block)
-        times.append(time.perf_counter() - start)
-    return statistics.median(times[len(times) // 3 :])  # the first calls load and compile
 
 
 @check(_STAGE)

@@ -14,27 +14,16 @@ from numpy.typing import NDArray
 from uwbbench.api import registry
 from uwbbench.api.block import Block
 from uwbbench.api.capture import Capture
+from uwbbench.api.case import NotApplicable
 from uwbbench.api.detections import Detections
 from uwbbench.api.errors import UwbbenchError
+from uwbbench.api.registry import AuthoredKind
 from uwbbench.api.stage import Stage
-from uwbbench.tools.check.check import Kind, Nonconformity, NotApplicable
+from uwbbench.tools.check.check import Nonconformity
 from uwbbench.tools.check.inputs import frames_of, pieces, usual_capture
 from uwbbench.tools.check.params import working_params
 from uwbbench.tools.check.subject import ClassSubject
 from uwbbench.tools.check.values import Values, of_blocks
-
-STANDARD = (
-    "noise_floor",
-    "profile.minmax",
-    "first_path.crest",
-    "peaks",
-    "score.snr",
-    "pdoa",
-    "azimuth",
-    "range",
-    "position",
-)
-"""Stages that make all the usual ports, in order."""
 
 PARTS = {"first_path": "first_path", "noise": "noise_rms", "profile": "profile"}
 """Attribute of a block behind each port that is one."""
@@ -43,7 +32,7 @@ PARTS = {"first_path": "first_path", "noise": "noise_rms", "profile": "profile"}
 class StageSubject(ClassSubject):
     """One stage, and the usual block that it is given."""
 
-    kind: ClassVar[Kind] = "stage"
+    kind: ClassVar[AuthoredKind] = "stage"
     base: ClassVar[type] = Stage
 
     @cached_property
@@ -157,12 +146,25 @@ def behind_all(capture: Capture, consumes: frozenset[str]) -> Block:
     """
     block = Block(frames_of(capture))
     made = frozenset({"frames"})
-    for name in STANDARD:
-        if name in registry.entries("stages"):
-            block, made = _through(name, block, made, capture)
+    for name in _makers():
+        block, made = _through(name, block, made, capture)
     for port in sorted(consumes - made):
         block, made = _with_port(port, block, made, capture)
     return block
+
+
+def _makers() -> list[str]:
+    """Default makers of ports: at each place the first, by the name of its port, for which all that it takes is there.
+
+    A range is thus taken behind the azimuth that it looks at where there is one.
+    """
+    waiting = {name: registry.load_plugin("stages", name) for name in registry.makers().values()}
+    chain: list[str] = []
+    made = frozenset({"frames"})
+    while ready := next((name for name, cls in waiting.items() if cls.consumes <= made), None):
+        made |= waiting.pop(ready).produces
+        chain.append(ready)
+    return chain
 
 
 def _with_port(port: str, block: Block, made: frozenset[str], capture: Capture) -> tuple[Block, frozenset[str]]:

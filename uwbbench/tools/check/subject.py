@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from uwbbench.api import registry
 from uwbbench.api.errors import ConfigError, PluginError
-from uwbbench.tools.check.check import Kind
+from uwbbench.api.registry import AuthoredKind
 from uwbbench.tools.check.params import working_params
 from uwbbench.tools.check.values import Values, digest
 
@@ -30,7 +30,7 @@ class Subject:
         Folders that a dataset searches.
     """
 
-    kind: ClassVar[Kind]
+    kind: ClassVar[AuthoredKind]
 
     def __init__(self, name: str, params: Mapping[str, Any] | None = None, roots: tuple[Path, ...] = ()) -> None:
         self.name = name

@@ -1,43 +1,44 @@
-"""All checks of each kind of plugin, put to one of them."""
+"""All checks of each kind of plugin, and what one of them makes of them."""
 
 from __future__ import annotations
 
 import unittest
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 from uwbbench.api import registry
-from uwbbench.api.errors import ConfigError, PluginError, nearest
+from uwbbench.api.case import STATUSES, Check, CheckResult, Examination, HardCase, select
+from uwbbench.api.errors import PluginError, nearest
 from uwbbench.api.locate import shipped
+from uwbbench.api.registry import AUTHORED_KINDS, AuthoredKind
+from uwbbench.measure.robustness import all_cases
 from uwbbench.tools.check import (
     conduct,
     dataset,
     declaration,
     detector,
-    detector_cases,
     metric,
     source,
     stage_inputs,
     stage_ports,
     stage_stream,
 )
-from uwbbench.tools.check.check import KINDS, Check, Kind, Result
 from uwbbench.tools.check.dataset import DatasetSubject
 from uwbbench.tools.check.detector import DetectorSubject
 from uwbbench.tools.check.metric import MetricSubject
 from uwbbench.tools.check.stage_subject import StageSubject
 from uwbbench.tools.check.subject import Subject
 
-_SUBJECTS: dict[Kind, type[Subject]] = {
+_SUBJECTS: dict[AuthoredKind, type[Subject]] = {
     "stage": StageSubject,
     "detector": DetectorSubject,
     "dataset": DatasetSubject,
     "metric": MetricSubject,
 }
-_CHECKS: dict[Kind, tuple[Check, ...]] = {
+_CHECKS: dict[AuthoredKind, tuple[Check, ...]] = {
     "stage": (
         *declaration.CHECKS,
         declaration.origin_is_stated,
@@ -47,49 +48,49 @@ _CHECKS: dict[Kind, tuple[Check, ...]] = {
         *conduct.CHECKS,
         *stage_inputs.CHECKS,
     ),
-    "detector": (*detector.CHECKS, *conduct.CHECKS, *detector_cases.CHECKS),
+    "detector": (*detector.CHECKS, *conduct.CHECKS),
     "dataset": (*declaration.CHECKS, *source.CHECKS, *dataset.CHECKS, *conduct.CHECKS),
     "metric": (declaration.docstring_says_what_it_is, *source.CHECKS, *metric.CHECKS, *conduct.CHECKS),
 }
 
 
 @dataclass(frozen=True)
-class Conformance:
-    """How one plugin stood the checks of its kind.
+class Conformance(Examination):
+    """How one plugin took the checks of its kind.
 
     Attributes
     ----------
+    results : tuple of CheckResult
     kind, name : str
-    results : tuple of Result
     """
 
-    kind: Kind
+    kind: AuthoredKind
     name: str
-    results: tuple[Result, ...]
-
-    @property
-    def passed(self) -> bool:
-        """Whether no check failed, and none was broken by the plugin."""
-        return all(result.passed for result in self.results)
-
-    def count(self, status: str) -> int:
-        """Checks with this status."""
-        return sum(result.status == status for result in self.results)
 
     def to_dict(self) -> dict[str, Any]:
         """All results as plain values, for JSON."""
-        statuses = ("passed", "failed", "error", "not applicable")
-        counts = {status.replace(" ", "_"): self.count(status) for status in statuses}
+        counts = {status.replace(" ", "_"): self.count(status) for status in STATUSES}
         about = {"kind": self.kind, "name": self.name}
-        return {**about, **counts, "checks": [result.to_dict() for result in self.results]}
+        return {**about, **counts, "checks": [_row(result) for result in self.results]}
 
 
-def all_checks(kind: Kind) -> tuple[Check, ...]:
+def _row(result: CheckResult) -> dict[str, Any]:
+    about = {"check": result.check.name, "statement": result.check.asked, "read_more": result.check.read_more}
+    return about | {key: getattr(result, key) for key in ("status", "detail", "expected", "found", "trace")}
+
+
+def all_checks(kind: AuthoredKind) -> tuple[Check, ...]:
     """Every check that a kind of plugin is put to, in order."""
-    return _CHECKS[kind]
+    return _CHECKS[kind] + (tuple(_of_detectors(case) for case in all_cases()) if kind == "detector" else ())
 
 
-def kinds_of(name: str) -> tuple[Kind, ...]:
+def _of_detectors(case: HardCase) -> Check:
+    """A hard case as a check of detectors."""
+    command = f"uwbbench stability --case {case.name} --detector NAME"
+    return replace(case, name=f"hard-{case.name}", run=lambda subject: case.run(subject.hardened), read_more=command)
+
+
+def kinds_of(name: str) -> tuple[AuthoredKind, ...]:
     """Kinds of plugin that bear a name; a path of a YAML file is a detector.
 
     Raises
@@ -99,16 +100,18 @@ def kinds_of(name: str) -> tuple[Kind, ...]:
     """
     if name.endswith((".yaml", ".yml")):
         return ("detector",)
-    known = {kind: list(registry.entries(f"{kind}s")) for kind in KINDS}
+    known = {kind: list(registry.entries(f"{kind}s")) for kind in AUTHORED_KINDS}
     known["detector"] += shipped("detectors")
-    found = tuple(kind for kind in KINDS if name in known[kind])
+    found = tuple(kind for kind in AUTHORED_KINDS if name in known[kind])
     if not found:
         every = [other for names in known.values() for other in names]
         raise PluginError(f"no stage, detector, dataset or metric named '{name}'.{nearest(name, every)}")
     return found
 
 
-def subject_of(kind: Kind, name: str, params: Mapping[str, Any] | None = None, roots: Sequence[Path] = ()) -> Subject:
+def subject_of(
+    kind: AuthoredKind, name: str, params: Mapping[str, Any] | None = None, roots: Sequence[Path] = ()
+) -> Subject:
     """Plugin to be examined.
 
     Raises
@@ -133,16 +136,13 @@ def examine(subject: Subject, names: Sequence[str] | None = None) -> Conformance
     ConfigError
         If there is no check of such a name.
     """
-    known = {one.name: one for one in all_checks(subject.kind)}
-    for name in names or ():
-        if name not in known:
-            raise ConfigError(f"no check of {subject.kind}s is named '{name}'.{nearest(name, known)}")
-    chosen = known.values() if names is None else [known[name] for name in names]
-    return Conformance(subject.kind, subject.name, tuple(one.judge(subject) for one in chosen))
+    checks = all_checks(subject.kind)
+    chosen = checks if names is None else select(checks, names, f"check of {subject.kind}s")
+    return Conformance(tuple(one.judge(subject) for one in chosen), subject.kind, subject.name)
 
 
 def checks_for(
-    kind: Kind, name: str, params: Mapping[str, Any] | None = None, roots: Sequence[Path] = ()
+    kind: AuthoredKind, name: str, params: Mapping[str, Any] | None = None, roots: Sequence[Path] = ()
 ) -> list[tuple[str, Callable[[], None]]]:
     """Checks of a plugin as tests: pairs of a name and a function to call.
 

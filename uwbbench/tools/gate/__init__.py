@@ -5,8 +5,8 @@ verdicts, and the verdicts together an exit code that a CI job acts on. Detector
 Python environment or in others; what decides is here.
 """
 
-from uwbbench.tools.gate.check import Check, Result, Verdict
+from uwbbench.tools.gate.check import Check, GateResult, GateVerdict
 from uwbbench.tools.gate.config import Gate, read_gate
 from uwbbench.tools.gate.execute import run_gate
 
-__all__ = ["Check", "Gate", "Result", "Verdict", "read_gate", "run_gate"]
+__all__ = ["Check", "Gate", "GateResult", "GateVerdict", "read_gate", "run_gate"]

@@ -23,13 +23,12 @@ from uwbbench.api import registry
 from uwbbench.api.capture import Capture
 from uwbbench.api.detections import Detections
 from uwbbench.api.errors import ScoringError
-from uwbbench.api.metric import Outcome
+from uwbbench.api.metric import Metric, Outcome
 from uwbbench.config.source import CaptureRef
 from uwbbench.measure.accuracy.scoring import Region, ScoringRules, outcomes
 from uwbbench.measure.accuracy.stats import MINIMUM_GROUPS, Estimate, bootstrap, paired_difference
 from uwbbench.run.folder.tables import read_detections
-from uwbbench.show.text.wording import TITLES
-from uwbbench.tools.gate.check import Check, Verdict
+from uwbbench.tools.gate.check import Check, GateVerdict
 from uwbbench.tools.gate.config import AccuracyModel, Gate
 from uwbbench.tools.gate.link import SetUpError, Worker, detect
 from uwbbench.tools.gate.stored import StoredRun
@@ -81,10 +80,13 @@ def accuracy_check(gate: Gate, rule: AccuracyModel, label: str, found: list[Foun
         If nothing can be said: there is no truth, or the stored run is not what it should be.
     """
     source = ", SIMULATED" if any(one.capture.source == "simulated" for one in found) else ""
-    title = TITLES.get(rule.metric, rule.metric)
+    metric: type[Metric] = registry.load_plugin("metrics", rule.metric)
+    title = metric.title or rule.metric
     name = f"{title} ({rule.scoring} scoring, {rule.table}) on {label}{source}"
-    metric = registry.load_plugin("metrics", rule.metric)
-    blank = Check(kind="accuracy", name=name, verdict=Verdict.INVALID, quantity=title, unit=metric.unit)
+    samples = "errors" if metric.merge == "stack" else "frames"
+    blank = Check(
+        kind="accuracy", name=name, verdict=GateVerdict.INVALID, quantity=title, unit=metric.unit, counted=samples
+    )
     outcome = partial(_outcome, gate, rule)
     mine = [outcome(one.capture, one.detections) for one in found]
     settings = {**gate.model.intervals.model_dump(), "seed": gate.model.seed}
@@ -107,9 +109,9 @@ def _name_of(gate: Gate) -> str:
 
 
 def _outcome(gate: Gate, rule: AccuracyModel, capture: Capture, found: Detections) -> Outcome:
-    region = gate.model.region
-    where = Region(region.min_range_m, region.max_range_m, region.half_angle_rad)
-    tables = outcomes(found, capture.header, ScoringRules(rule.scoring, gate.model.gate_m, where, gate.model.strongest))
+    region = Region(**gate.model.region.limits)
+    rules = ScoringRules(rule.scoring, gate.model.gate_m, region, gate.model.strongest)
+    tables = outcomes(found, capture.header, rules)
     if rule.table not in tables:
         raise ScoringError(f"capture '{capture.name}': nothing after mapping: the detector does not cluster positions")
     return tables[rule.table]
@@ -125,9 +127,9 @@ def _limited(check: Check, rule: AccuracyModel, found: Estimate) -> Check:
         return _undefined(check, found)
     kept = found.value >= limit if bound == "minimum" else found.value <= limit
     if kept:
-        return replace(check, verdict=Verdict.PASS)
+        return replace(check, verdict=GateVerdict.PASS)
     advice = "see which frames are lost with 'uwbbench plot', or state another limit"
-    return replace(check, verdict=Verdict.REGRESSION, reason="beyond the limit", advice=advice)
+    return replace(check, verdict=GateVerdict.REGRESSION, reason="beyond the limit", advice=advice)
 
 
 def _compared(check: Check, rule: AccuracyModel, better: str, found: Estimate) -> Check:
@@ -140,20 +142,20 @@ def _compared(check: Check, rule: AccuracyModel, better: str, found: Estimate) -
     if math.isnan(found.value):
         return _undefined(check, found)
     if -sign * found.value <= rule.tolerance:
-        return replace(check, verdict=Verdict.PASS)
+        return replace(check, verdict=GateVerdict.PASS)
     if math.isnan(found.low):
         return replace(
             check,
-            verdict=Verdict.INCONCLUSIVE,
+            verdict=GateVerdict.INCONCLUSIVE,
             reason=f"worse, but {found.groups} groups are too few for an interval",
             advice=f"gate on {MINIMUM_GROUPS} captures, or seconds of one, or more; or allow a tolerance",
         )
     least_loss = -found.high if better == "higher" else found.low
     if least_loss <= rule.tolerance:
-        return replace(check, verdict=Verdict.PASS, reason="worse, but within the interval")
+        return replace(check, verdict=GateVerdict.PASS, reason="worse, but within the interval")
     return replace(
         check,
-        verdict=Verdict.REGRESSION,
+        verdict=GateVerdict.REGRESSION,
         reason="worse by more than the interval",
         advice="compare with the stored run",
     )
@@ -162,14 +164,15 @@ def _compared(check: Check, rule: AccuracyModel, better: str, found: Estimate) -
 def _with(check: Check, found: Estimate) -> Check:
     """Check with a value, its interval and what is behind it."""
     value, low, high = (None if math.isnan(part) else part for part in (found.value, found.low, found.high))
-    counted = f"{'errors' if check.unit == 'm' else 'frames'} in {found.groups} groups"
-    return replace(check, value=value, low=low, high=high, n=found.n, counted=counted)
+    return replace(
+        check, value=value, low=low, high=high, n=found.n, counted=f"{check.counted} in {found.groups} groups"
+    )
 
 
 def _undefined(check: Check, found: Estimate) -> Check:
     """Check of a number that is undefined: too few samples can be helped by more, none at all cannot."""
     if found.n:
         reason = f"{found.n} samples are too few"
-        return replace(check, verdict=Verdict.INCONCLUSIVE, reason=reason, advice="gate on more or longer captures")
+        return replace(check, verdict=GateVerdict.INCONCLUSIVE, reason=reason, advice="gate on more or longer captures")
     reason = "undefined: nothing was retained, nothing was to be found, or the truth is not exhaustive"
     return replace(check, reason=reason, advice="see the same numbers with 'uwbbench score'")

@@ -8,11 +8,13 @@ from enum import StrEnum
 from typing import Any, Literal
 
 from uwbbench.run.folder.identity import plain
+from uwbbench.show.text.numbers import number
 
-Kind = Literal["captures", "accuracy", "deadline", "canary", "latency"]
+Aspect = Literal["captures", "accuracy", "deadline", "canary", "latency"]
+"""What a check is about."""
 
 
-class Verdict(StrEnum):
+class GateVerdict(StrEnum):
     """Outcome of a check, and of a gate."""
 
     PASS = "pass"  # noqa: S105 - no password
@@ -23,10 +25,10 @@ class Verdict(StrEnum):
     @property
     def exit_code(self) -> int:
         """Exit code of the command: 0 pass, 1 regression, 2 inconclusive, 3 invalid."""
-        return list(Verdict).index(self)
+        return list(GateVerdict).index(self)
 
 
-_GRAVITY = (Verdict.REGRESSION, Verdict.INVALID, Verdict.INCONCLUSIVE)
+_GRAVITY = (GateVerdict.REGRESSION, GateVerdict.INVALID, GateVerdict.INCONCLUSIVE)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,7 +41,7 @@ class Check:
         A canary compares the base with itself; captures are those that cannot be listed.
     name : str
         What was checked, and on which captures.
-    verdict : Verdict
+    verdict : GateVerdict
     quantity : str
         What the value is, for people.
     value, low, high : float or None
@@ -58,9 +60,9 @@ class Check:
     elapsed_s : float
     """
 
-    kind: Kind
+    kind: Aspect
     name: str
-    verdict: Verdict
+    verdict: GateVerdict
     quantity: str = ""
     value: float | None = None
     low: float | None = None
@@ -79,9 +81,9 @@ class Check:
         """Value, interval and number of samples, for people."""
         if self.value is None:
             return "n/a"
-        text = number(self.value, self.unit)
+        text = _quantity(self.value, self.unit)
         if self.low is not None and self.high is not None:
-            text += f" [{number(self.low, self.unit)}, {number(self.high, self.unit)}]"
+            text += f" [{_quantity(self.low, self.unit)}, {_quantity(self.high, self.unit)}]"
         return f"{self.quantity} {text}, {self.n} {self.counted}".strip()
 
     @property
@@ -90,11 +92,11 @@ class Check:
         if self.limit is None:
             return ""
         sign = "<=" if self.bound == "maximum" else ">="
-        return f"{sign} {number(self.limit, self.unit)}"
+        return f"{sign} {_quantity(self.limit, self.unit)}"
 
 
 @dataclass(frozen=True)
-class Result:
+class GateResult:
     """All checks of a gate.
 
     Attributes
@@ -115,10 +117,10 @@ class Result:
     machine: dict[str, Any]
 
     @property
-    def verdict(self) -> Verdict:
+    def verdict(self) -> GateVerdict:
         """Gravest verdict of all checks: a proven regression, then what is invalid, then what is inconclusive."""
         found = {check.verdict for check in self.checks}
-        return next((verdict for verdict in _GRAVITY if verdict in found), Verdict.PASS)
+        return next((verdict for verdict in _GRAVITY if verdict in found), GateVerdict.PASS)
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values for JSON."""
@@ -127,16 +129,13 @@ class Result:
         return dict(plain({**about, "head": self.head, "base": self.base, "checks": checks, "machine": self.machine}))
 
 
-def number(value: float, unit: str) -> str:
+def _quantity(value: float, unit: str) -> str:
     """Number as people read it: centimetres, per cent, or three digits.
 
     Examples
     --------
-    >>> number(0.0312, "m"), number(0.004, "share"), number(1.0123, "")
+    >>> _quantity(0.0312, "m"), _quantity(0.004, "share"), _quantity(1.0123, "")
     ('3.12 cm', '0.40 %', '1.012')
     """
-    if unit == "m":
-        return f"{value * 100:.2f} cm"
-    if unit == "share":
-        return f"{value * 100:.2f} %"
-    return f"{value:.3f} {unit}".rstrip()
+    digits, scale, shown = {"m": (2, 100.0, "cm"), "share": (2, 100.0, "%")}.get(unit, (3, 1.0, unit))
+    return number(value, digits, scale, shown)

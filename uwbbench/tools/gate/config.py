@@ -5,53 +5,39 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
+from pydantic import Field, model_validator
 
 from uwbbench.api import registry
 from uwbbench.api.check import checked
-from uwbbench.api.errors import ConfigError
-from uwbbench.api.locate import find_config
+from uwbbench.api.errors import ConfigError, nearest
+from uwbbench.api.locate import find_config, is_path
 from uwbbench.api.override import with_values
 from uwbbench.api.yaml_file import YamlFile
+from uwbbench.config.datasets import DatasetSource, DatasetUse, dataset_sources
 from uwbbench.config.detector import read_detector
+from uwbbench.config.extends import placed
 from uwbbench.config.given import Given, read_given
+from uwbbench.config.model import ConfigModel, DetectorName, NamedNull
+from uwbbench.config.rules import GateRadius, IntervalModel, RegionModel, Scoring, Strongest, Table
 from uwbbench.config.source import data_roots
 from uwbbench.detect.pipeline import Pipeline
-from uwbbench.run.experiment import (
-    DatasetSource,
-    DatasetUse,
-    IntervalModel,
-    RegionModel,
-    Scoring,
-    dataset_sources,
-    standing,
-)
 
 Captures = Literal["first", "all"]
 
 
-class _Model(BaseModel):
-    model_config = ConfigDict(extra="forbid", populate_by_name=True, allow_inf_nan=False, frozen=True)
-
-
-class SideModel(_Model):
+class SideModel(ConfigModel):
     """A detector, changed or in another Python environment."""
 
-    detector: str = Field(description="Name, or path to a detector YAML.")
+    detector: DetectorName = Field(description="Name, or path to a detector YAML.")
     set: dict[str, Any] = Field(default_factory=dict, description="Values to change in the detector, by path.")
     python: str | None = Field(
         default=None, min_length=1, description="Interpreter of the environment it lives in, such as base/bin/python."
     )
 
-    @field_validator("detector", mode="before")
-    @classmethod
-    def _null(cls, value: Any) -> Any:
-        return "null" if value is None else value
 
-
-class LatencyGateModel(_Model):
+class LatencyGateModel(ConfigModel):
     """How much slower than the base the head may be."""
 
     maximum_ratio: float = Field(default=1.05, gt=1, description="Largest time of the head, relative to the base.")
@@ -63,7 +49,7 @@ class LatencyGateModel(_Model):
     warmup_windows: int = Field(default=10, ge=2, description="Windows of warm-up at most, if they never agree.")
 
 
-class DeadlineModel(_Model):
+class DeadlineModel(ConfigModel):
     """How many frames may be answered later than the next one comes."""
 
     maximum_missed_share: float = Field(default=0.01, ge=0, lt=1, description="Largest share of missed deadlines.")
@@ -76,12 +62,12 @@ class DeadlineModel(_Model):
     warmup_windows: int = Field(default=10, ge=2, description="Windows of warm-up at most, if they never agree.")
 
 
-class AccuracyModel(_Model):
+class AccuracyModel(ConfigModel):
     """A limit of one metric, for each dataset."""
 
     metric: str = Field(description="Registered metric, such as f1, recall, mae or p95.")
     scoring: Scoring = Field(description="How detections are counted.")
-    table: Literal["filtering", "mapping"] = Field(default="filtering", description="After which half of the chain.")
+    table: Table = Field(default="filtering", description="After which half of the chain.")
     dataset: str | None = Field(default=None, description="Only this dataset, by its name; null: each.")
     minimum: float | None = Field(default=None, description="Least value, in the metric's unit (metres for errors).")
     maximum: float | None = Field(default=None, description="Largest value, in the metric's unit.")
@@ -101,13 +87,15 @@ class AccuracyModel(_Model):
         return self
 
 
-class GateModel(_Model):
+class GateModel(ConfigModel):
     """A gate: a detector, captures, and limits."""
 
     version: Literal[1] = Field(alias="schema", description="Version of this file format.")
     name: str | None = Field(default=None, min_length=1, description="Name of the gate; the file's name if left out.")
     description: str = ""
-    head: str | SideModel | None = Field(description="Detector under test: name, path, or with an environment.")
+    head: Annotated[str | SideModel | None, NamedNull] = Field(
+        description="Detector under test: name, path, or with an environment."
+    )
     base: str | SideModel | None = Field(default=None, description="What its speed is compared with.")
     datasets: list[DatasetUse] = Field(default_factory=list, description="Captures, as in an experiment.")
     captures: list[str] = Field(
@@ -116,19 +104,12 @@ class GateModel(_Model):
     latency: LatencyGateModel | None = Field(default=None, description="Speed against the base; null: not checked.")
     deadline: DeadlineModel | None = Field(default=None, description="Missed deadlines; null: not checked.")
     accuracy: list[AccuracyModel] = Field(default_factory=list)
-    gate_m: float = Field(default=0.20, gt=0, description="Largest error of a true detection.")
+    gate_m: GateRadius
     region: RegionModel = Field(default_factory=RegionModel)
-    strongest: int | None = Field(
-        default=None, ge=1, description="Score only that many detections of a frame, the strongest."
-    )
+    strongest: Strongest
     seed: int = Field(default=0, ge=0, description="Of the resampling behind the intervals of accuracy.")
     intervals: IntervalModel = Field(default_factory=IntervalModel)
     timeout_s: float = Field(default=600.0, gt=0, description="A single answer that takes longer has failed.")
-
-    @field_validator("head", mode="before")
-    @classmethod
-    def _null(cls, value: Any) -> Any:
-        return "null" if value is None else value
 
 
 @dataclass(frozen=True)
@@ -216,7 +197,9 @@ def read_gate(name: Given, changes: Mapping[str, Any] | None = None, data_dir: P
         raise ConfigError(f"{source.place(('latency',))}: needs a 'base' that the head is compared with")
     uses = list(model.datasets)
     if model.captures:
-        uses.append(DatasetUse(use="capture", name="captures", params={"files": model.captures}))
+        uses.append(
+            DatasetUse(use=registry.default("dataset.files"), name="captures", params={"files": model.captures})
+        )
     if not uses:
         raise ConfigError(f"{source.name}: no captures: expected 'datasets' or 'captures'")
     datasets = dataset_sources(uses, source, [str(root) for root in data_roots(data_dir, path)])
@@ -228,9 +211,10 @@ def read_gate(name: Given, changes: Mapping[str, Any] | None = None, data_dir: P
 
 def _side(label: str, given: str | SideModel | None, source: YamlFile, folder: Path) -> Side:
     use = given if isinstance(given, SideModel) else SideModel(detector=given)  # type: ignore[arg-type]  # null is one
-    is_file = use.detector.endswith((".yaml", ".yml")) or "/" in use.detector
-    with standing(source, (label,)):
-        detector = str(find_config("detectors", use.detector, folder).absolute()) if is_file else use.detector
+    with placed(source, (label,)):
+        detector = (
+            str(find_config("detectors", use.detector, folder).absolute()) if is_path(use.detector) else use.detector
+        )
         if use.python is None:
             Pipeline(read_detector(detector, None, use.set))
     # Not resolved: the interpreter of a virtual environment is a link, and finds its packages by where that lies.
@@ -241,7 +225,7 @@ def _side(label: str, given: str | SideModel | None, source: YamlFile, folder: P
 def _check_rule(rule: AccuracyModel, labels: set[str], source: YamlFile, index: int) -> None:
     """Refuse a limit that can mean nothing."""
     at = ("accuracy", index)
-    with standing(source, (*at, "metric")):
+    with placed(source, (*at, "metric")):
         metric = registry.load_plugin("metrics", rule.metric)
     wrong = {"higher": "maximum", "lower": "minimum"}.get(metric.better, "")
     if wrong and getattr(rule, wrong) is not None:
@@ -251,7 +235,5 @@ def _check_rule(rule: AccuracyModel, labels: set[str], source: YamlFile, index: 
     if metric.better == "zero" and rule.no_worse_than is not None:
         raise ConfigError(f"{source.place((*at, 'no_worse_than'))}: of '{rule.metric}' neither end is better")
     if rule.dataset is not None and rule.dataset not in labels:
-        from uwbbench.api.errors import nearest
-
         place = source.place((*at, "dataset"))
         raise ConfigError(f"{place}: no dataset '{rule.dataset}' in this gate.{nearest(rule.dataset, labels)}")

@@ -6,7 +6,7 @@ import numpy as np
 
 from uwbbench.config.source import CaptureRef
 from uwbbench.measure.latency.latency import miss_summary
-from uwbbench.tools.gate.check import Check, Verdict
+from uwbbench.tools.gate.check import Check, GateVerdict
 from uwbbench.tools.gate.config import DeadlineModel, Gate
 from uwbbench.tools.gate.link import join, worker_of
 
@@ -32,7 +32,7 @@ def deadline_checks(gate: Gate, settings: DeadlineModel, label: str, ref: Captur
             found_us = np.append(found_us, answer["responses_us"])
             missed = miss_summary(found_us, 1e6 / rate_hz)
             verdict = share_verdict(missed["missed"], missed["missed_share_low"], missed["missed_share_high"], settings)
-            if verdict is not Verdict.INCONCLUSIVE or len(found_us) >= most:
+            if verdict is not GateVerdict.INCONCLUSIVE or len(found_us) >= most:
                 break
     name = f"{label}, SIMULATED" if joined["source"] == "simulated" else label
     how = "paced" if settings.paced else "one by one"
@@ -61,7 +61,7 @@ def deadline_checks(gate: Gate, settings: DeadlineModel, label: str, ref: Captur
         Check(
             kind="deadline",
             name=f"longest burst on {name}",
-            verdict=Verdict.REGRESSION if exceeded else Verdict.PASS,
+            verdict=GateVerdict.REGRESSION if exceeded else GateVerdict.PASS,
             quantity="missed in a row",
             value=burst,
             n=len(found_us),
@@ -69,24 +69,24 @@ def deadline_checks(gate: Gate, settings: DeadlineModel, label: str, ref: Captur
             unit="frames",
             limit=settings.maximum_burst,
             reason="too many deadlines missed in a row" if exceeded else "",
-            advice=_ADVICE[Verdict.REGRESSION] if exceeded else "",
+            advice=_ADVICE[GateVerdict.REGRESSION] if exceeded else "",
         ),
     ]
 
 
-def share_verdict(missed: int, low: float, high: float, settings: DeadlineModel) -> Verdict:
-    """Verdict of a share with its bounds; where none is allowed, none seen is all that can be asked for."""
+def share_verdict(missed: int, low: float, high: float, settings: DeadlineModel) -> GateVerdict:
+    """GateVerdict of a share with its bounds; where none is allowed, none seen is all that can be asked for."""
     if low > settings.maximum_missed_share:
-        return Verdict.REGRESSION
+        return GateVerdict.REGRESSION
     none_allowed = settings.maximum_missed_share == 0 and missed == 0
-    return Verdict.PASS if high <= settings.maximum_missed_share or none_allowed else Verdict.INCONCLUSIVE
+    return GateVerdict.PASS if high <= settings.maximum_missed_share or none_allowed else GateVerdict.INCONCLUSIVE
 
 
 _REASONS = {
-    Verdict.REGRESSION: "more deadlines missed than allowed",
-    Verdict.INCONCLUSIVE: "too few frames to tell the share from its limit",
+    GateVerdict.REGRESSION: "more deadlines missed than allowed",
+    GateVerdict.INCONCLUSIVE: "too few frames to tell the share from its limit",
 }
 _ADVICE = {
-    Verdict.REGRESSION: "make the head faster, or gate on the machine that the radar will have",
-    Verdict.INCONCLUSIVE: "raise deadline.frames or deadline.patience",
+    GateVerdict.REGRESSION: "make the head faster, or gate on the machine that the radar will have",
+    GateVerdict.INCONCLUSIVE: "raise deadline.frames or deadline.patience",
 }

@@ -12,7 +12,7 @@ from uwbbench.config.source import CaptureRef
 from uwbbench.measure.latency.machine import machine
 from uwbbench.run.plan import reason_of
 from uwbbench.tools.gate.accuracy import Found, accuracy_check, found_on
-from uwbbench.tools.gate.check import Check, Kind, Result, Verdict
+from uwbbench.tools.gate.check import Aspect, Check, GateResult, GateVerdict
 from uwbbench.tools.gate.config import AccuracyModel, Captures, Gate
 from uwbbench.tools.gate.deadline import deadline_checks
 from uwbbench.tools.gate.latency import latency_checks
@@ -22,7 +22,7 @@ Told = Callable[[str], None]
 Listed = Mapping[str, Sequence[CaptureRef]]
 
 
-def run_gate(gate: Gate, tell: Told = lambda _: None) -> Result:
+def run_gate(gate: Gate, tell: Told = lambda _: None) -> GateResult:
     """Make all checks of a gate: accuracy, deadlines, then speed against the base.
 
     Parameters
@@ -33,7 +33,7 @@ def run_gate(gate: Gate, tell: Told = lambda _: None) -> Result:
 
     Returns
     -------
-    Result
+    GateResult
         What could not be measured is a check with the verdict ``invalid``.
     """
     checks: list[Check] = []
@@ -50,7 +50,7 @@ def run_gate(gate: Gate, tell: Told = lambda _: None) -> Result:
         latency, base = model.latency, gate.base
         for label, ref in _timed(listed, latency.captures):
             checks += _made("latency", label, partial(latency_checks, gate, base, latency, label, ref, tell))
-    return Result(gate.name, gate.head.text, "" if gate.base is None else gate.base.text, tuple(checks), machine())
+    return GateResult(gate.name, gate.head.text, "" if gate.base is None else gate.base.text, tuple(checks), machine())
 
 
 def _listed(gate: Gate, checks: list[Check]) -> dict[str, list[CaptureRef]]:
@@ -98,7 +98,7 @@ def _one_accuracy(gate: Gate, rule: AccuracyModel, label: str, found: list[Found
     return [accuracy_check(gate, rule, label, found)]
 
 
-def _made(kind: Kind, name: str, make: Callable[[], list[Check]]) -> list[Check]:
+def _made(kind: Aspect, name: str, make: Callable[[], list[Check]]) -> list[Check]:
     """Checks with the time that they took."""
     started = perf_counter()
     try:
@@ -108,6 +108,6 @@ def _made(kind: Kind, name: str, make: Callable[[], list[Check]]) -> list[Check]
     return [replace(check, elapsed_s=(perf_counter() - started) / len(checks)) for check in checks]
 
 
-def _invalid(kind: Kind, name: str, reason: str) -> Check:
+def _invalid(kind: Aspect, name: str, reason: str) -> Check:
     advice = "repair what the reason names; nothing was measured"
-    return Check(kind=kind, name=f"{kind} of {name}", verdict=Verdict.INVALID, reason=reason, advice=advice)
+    return Check(kind=kind, name=f"{kind} of {name}", verdict=GateVerdict.INVALID, reason=reason, advice=advice)

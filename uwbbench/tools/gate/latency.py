@@ -1,4 +1,4 @@
-"""Relative latency: head against base on the same frames, in one job, by the rule of :mod:`uwbbench.tools.gate.ratio`.
+"""Relative latency: head against base on the same frames, in one job, by the rule of :mod:`uwbbench.tools.gate.rule`.
 
 Absolute times do not travel between machines, not even between two hours of one: nothing is compared with a stored
 time.
@@ -6,7 +6,6 @@ time.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
@@ -14,16 +13,12 @@ from typing import Any
 import numpy as np
 
 from uwbbench.config.source import CaptureRef
-from uwbbench.tools.gate.check import Check, Verdict
+from uwbbench.measure.latency.player import turn_frames
+from uwbbench.measure.latency.ratio import Ratio, alternate, log_ratios
+from uwbbench.tools.gate.check import Aspect, Check, GateVerdict
 from uwbbench.tools.gate.config import Gate, LatencyGateModel, Side
 from uwbbench.tools.gate.link import SetUpError, Worker, join, worker_of
-from uwbbench.tools.gate.ratio import Ratio, Sampler, canary, compared, log_ratios
-
-TURN_S = 1.5e-3
-"""A turn lasts about this long: thousands of readings of the clock, and less than the time slice of another process."""
-
-TURN_FRAMES = 64
-"""A turn has at least so many frames: work that comes every fifty, such as clustering, is part of every turn."""
+from uwbbench.tools.gate.rule import Sampler, canary, compared
 
 MINIMUM_FRAMES = 100
 """With fewer frames the processor learns them by heart, and their times say little of new ones."""
@@ -75,7 +70,7 @@ def checks_within(
     few = _too_few(label, joined["base"])
     if few:
         return few
-    size = turn_size(min(found["call_s"] for found in joined.values()))
+    size = turn_frames([found["call_s"] for found in joined.values()])
     again, other = (partial(_blocks, worker, player, size) for player in ("base again", "head"))
     return _judged(label, settings, again, other, settings.blocks, "blocks", tell)
 
@@ -112,9 +107,9 @@ def _pair(gate: Gate, settings: LatencyGateModel, ref: CaptureRef, first: Side, 
     """Median log ratio of the blocks of two fresh processes that take turns."""
     with worker_of(first, gate.model.timeout_s) as one, worker_of(second, gate.model.timeout_s) as other:
         joined = _both_joined((one, other), (first, second), settings, ref)
-        size = turn_size(min(found["call_s"] for found in joined))
-        blocks = log_ratios(partial(_turn, one, size), partial(_turn, other, size), settings.blocks)
-        return float(np.median(np.array(blocks)))
+        size = turn_frames([found["call_s"] for found in joined])
+        times_s = alternate([partial(_turn, worker, size) for worker in (one, other)], settings.blocks)
+        return float(np.median(log_ratios(times_s[:, 1], times_s[:, 0])))
 
 
 def _both_joined(
@@ -132,18 +127,13 @@ def _both_joined(
     return joined
 
 
-def turn_size(call_s: float) -> int:
-    """Frames of a turn of detectors whose faster one takes so long for a frame."""
-    return max(TURN_FRAMES, math.ceil(TURN_S / call_s))
-
-
 def _turn(worker: Worker, size: int) -> float:
     return float(worker.ask("turn", player="only", size=size)["spent_s"])
 
 
 def _blocks(worker: Worker, player: str, size: int, count: int) -> Sequence[float]:
-    found: Sequence[float] = worker.ask("blocks", base="base", head=player, size=size, count=count)["log_ratios"]
-    return found
+    answer = worker.ask("blocks", base="base", head=player, size=size, count=count)
+    return list(answer["log_ratios"])
 
 
 def _labelled(label: str, joined: dict[str, Any]) -> str:
@@ -157,7 +147,7 @@ def _too_few(label: str, joined: dict[str, Any]) -> list[Check]:
         Check(
             kind="latency",
             name=f"latency on {label}",
-            verdict=Verdict.INCONCLUSIVE,
+            verdict=GateVerdict.INCONCLUSIVE,
             reason=f"{joined['frames']} frames are too few; at least {MINIMUM_FRAMES} are needed",
             advice="time a longer capture, or raise latency.frames",
         )
@@ -175,7 +165,7 @@ def _judged(
     tell(f"base against base on {label}")
     ratio, verdict = canary(again, **limits)
     first = _check("canary", f"base against base on {label}", ratio, verdict, counted, settings)
-    if verdict is not Verdict.PASS:
+    if verdict is not GateVerdict.PASS:
         unmeasured = Check(
             kind="latency",
             name=f"head against base on {label}",
@@ -190,14 +180,19 @@ def _judged(
 
 
 _SAID = {
-    ("canary", Verdict.INVALID): ("the same detector differs from itself", "look for other load on the machine"),
-    ("canary", Verdict.INCONCLUSIVE): ("times scatter too widely", "run again on a quieter machine"),
-    ("latency", Verdict.REGRESSION): ("the head is slower", "profile it, or allow more with latency.maximum_ratio"),
-    ("latency", Verdict.INCONCLUSIVE): ("the interval is too wide", "raise latency.patience, or quieten the machine"),
+    ("canary", GateVerdict.INVALID): ("the same detector differs from itself", "look for other load on the machine"),
+    ("canary", GateVerdict.INCONCLUSIVE): ("times scatter too widely", "run again on a quieter machine"),
+    ("latency", GateVerdict.REGRESSION): ("the head is slower", "profile it, or allow more with latency.maximum_ratio"),
+    ("latency", GateVerdict.INCONCLUSIVE): (
+        "the interval is too wide",
+        "raise latency.patience, or quieten the machine",
+    ),
 }
 
 
-def _check(kind: Any, name: str, ratio: Ratio, verdict: Verdict, counted: str, settings: LatencyGateModel) -> Check:
+def _check(
+    kind: Aspect, name: str, ratio: Ratio, verdict: GateVerdict, counted: str, settings: LatencyGateModel
+) -> Check:
     reason, advice = _SAID.get((kind, verdict), ("", ""))
     return Check(
         kind=kind,

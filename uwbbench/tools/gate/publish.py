@@ -7,15 +7,16 @@ from collections.abc import Iterator
 from datetime import UTC, datetime
 from xml.etree import ElementTree as ET
 
+from uwbbench.api.text import one_line
 from uwbbench.show.text.sheet import Sheet
-from uwbbench.tools.gate.check import Check, Result, Verdict
+from uwbbench.tools.gate.check import Check, GateResult, GateVerdict
 
-_OUTCOME = {Verdict.REGRESSION: "failure", Verdict.INVALID: "error", Verdict.INCONCLUSIVE: "error"}
+_OUTCOME = {GateVerdict.REGRESSION: "failure", GateVerdict.INVALID: "error", GateVerdict.INCONCLUSIVE: "error"}
 
 COLUMNS = ("check", "measured", "limit", "verdict", "why, and what next")
 
 
-def rows(result: Result) -> Iterator[tuple[str, ...]]:
+def rows(result: GateResult) -> Iterator[tuple[str, ...]]:
     """One row of text for each check, under :data:`COLUMNS`."""
     for check in result.checks:
         why = "; ".join(part for part in (check.reason, check.advice) if part)
@@ -24,7 +25,7 @@ def rows(result: Result) -> Iterator[tuple[str, ...]]:
         )
 
 
-def markdown(result: Result) -> str:
+def markdown(result: GateResult) -> str:
     """Summary as GitHub-flavoured Markdown; every name is escaped."""
     compared = f"head {one_line(result.head)}" + (f" against base {one_line(result.base)}" if result.base else "")
     notes = (compared, f"{one_line(result.machine['cpu'])}; times hold on this machine only, their ratio travels.")
@@ -32,7 +33,7 @@ def markdown(result: Result) -> str:
     return Sheet(title, COLUMNS, tuple(rows(result)), notes).markdown()
 
 
-def junit(result: Result) -> str:
+def junit(result: GateResult) -> str:
     """Result as JUnit XML.
 
     One ``testsuite`` for each kind of check, one ``testcase`` for each check: a regression is a ``failure``, what is
@@ -84,15 +85,3 @@ def _testcase(suite: ET.Element, gate: str, check: Check) -> None:
     said = [part for part in (check.measured_text, check.limit_text, check.advice) if part]
     told = ET.SubElement(case, outcome, message=one_line(check.reason or check.verdict.value), type=check.verdict.value)
     told.text = one_line("; ".join(said))
-
-
-def one_line(text: str) -> str:
-    r"""Text on one line, whatever is not printable, and not allowed in XML, shown by its escape.
-
-    Examples
-    --------
-    >>> one_line("two\nlines\x1b[0m")
-    'two lines\\x1b[0m'
-    """
-    joined = " ".join(text.split())
-    return "".join(char if char.isprintable() else char.encode("unicode_escape").decode() for char in joined)

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from uwbbench.api.capture import Capture
-    from uwbbench.tools.gate.player import Player
+    from uwbbench.measure.latency.player import Player
 
 PROTOCOL = 2
 """Raised whenever requests or answers change their meaning: only equal numbers understand each other."""
@@ -31,13 +31,14 @@ class Session:
         self, player: str, detector: dict[str, Any], capture: dict[str, Any], frames: int, windows: int
     ) -> dict[str, Any]:
         """Load a detector and frames of a capture, and warm up."""
-        from uwbbench.tools.gate.player import Player
+        from uwbbench.measure.latency.player import Player
 
         opened = _opened(capture)
-        joined = Player(_loaded(detector), opened, frames)
+        joined = Player(_loaded(detector), opened, opened.frames(0, frames))
         self._players[player] = joined
+        joined.warm_up(windows)
         return {
-            "call_s": joined.warm_up(windows),
+            "call_s": joined.call_s(),
             "frames": len(joined.whole),
             "content": joined.content,
             "frame_rate_hz": opened.radar.frame_rate_hz,
@@ -50,9 +51,11 @@ class Session:
 
     def blocks(self, base: str, head: str, size: int, count: int) -> dict[str, Any]:
         """Log ratios of two players of this process."""
-        from uwbbench.tools.gate.player import in_turns
+        from uwbbench.measure.latency.player import in_turns
+        from uwbbench.measure.latency.ratio import log_ratios
 
-        return {"log_ratios": list(in_turns(self._players[base], self._players[head], size, count))}
+        times_s = in_turns([self._players[base], self._players[head]], size, count)
+        return {"log_ratios": log_ratios(times_s[:, 1], times_s[:, 0]).tolist()}
 
     def respond(self, player: str, count: int, rate_hz: float, paced: bool) -> dict[str, Any]:
         """Response times of single frames."""

@@ -8,17 +8,14 @@ from importlib import resources
 from importlib.resources.abc import Traversable
 from pathlib import Path
 from string import Template
-from typing import Literal, get_args
 
 import uwbbench
 from uwbbench.api.errors import StoreError
+from uwbbench.api.registry import AuthoredKind
 from uwbbench.tools.scaffold.naming import PluginName
 
-Kind = Literal["stage", "detector", "dataset", "metric"]
-KINDS: tuple[Kind, ...] = get_args(Kind)
 
-
-def write_package(kind: Kind, name: str, folder: Path) -> Path:
+def write_package(kind: AuthoredKind, name: str, folder: Path) -> Path:
     """Write a small installable package with one plugin and its tests.
 
     Parameters
@@ -65,7 +62,7 @@ def write_package(kind: Kind, name: str, folder: Path) -> Path:
     return target
 
 
-def _files(kind: Kind, names: PluginName) -> dict[str, str]:
+def _files(kind: AuthoredKind, names: PluginName) -> dict[str, str]:
     """Text of each file by its path in the package."""
     source = f"src/{names.package}"
     facts = {

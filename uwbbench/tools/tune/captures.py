@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 from uwbbench.api.capture import Capture
 from uwbbench.api.errors import ConfigError, ScoringError
-from uwbbench.run.experiment import DatasetSource, Experiment
+from uwbbench.config.datasets import DatasetSource
+from uwbbench.run.experiment import Experiment
 from uwbbench.tools.tune.config import By
 
 

@@ -9,42 +9,32 @@ from pathlib import Path
 from typing import Any, Literal, Self
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from uwbbench.api import registry
 from uwbbench.api.check import checked
 from uwbbench.api.errors import ConfigError
 from uwbbench.api.filters import RankFilter
-from uwbbench.api.locate import find_config
+from uwbbench.api.locate import find_config, is_path
 from uwbbench.api.override import with_values
 from uwbbench.api.yaml_file import YamlFile
+from uwbbench.config.datasets import DatasetSource, DatasetUse, dataset_sources
 from uwbbench.config.detector import DetectorConfig, read_detector
+from uwbbench.config.extends import placed
 from uwbbench.config.given import Given, read_given
+from uwbbench.config.model import ConfigModel
+from uwbbench.config.rules import GateRadius, IntervalModel, RegionModel, Scoring, Table
 from uwbbench.config.source import data_roots
 from uwbbench.detect.pipeline import Pipeline
 from uwbbench.measure.accuracy.scoring import Region, ScoringRules
-from uwbbench.run.experiment import (
-    DatasetSource,
-    DatasetUse,
-    Experiment,
-    IntervalModel,
-    RegionModel,
-    Scoring,
-    dataset_sources,
-    read_experiment,
-    standing,
-)
+from uwbbench.run.experiment import Experiment, read_experiment
 from uwbbench.tools.tune.sweep.sweep import Sweep
 
 By = Literal["material", "channel", "material-channel", "overall"]
 Threshold = float | None
 
 
-class _Model(BaseModel):
-    model_config = ConfigDict(extra="forbid", populate_by_name=True, allow_inf_nan=False, frozen=True)
-
-
-class Steps(_Model):
+class Steps(ConfigModel):
     """Evenly spaced thresholds."""
 
     start: float
@@ -65,7 +55,7 @@ class Steps(_Model):
         return [float(f"{value:.12g}") for value in spaced(self.start, self.stop, self.count)]
 
 
-class Interval(_Model):
+class Interval(ConfigModel):
     """Numbers that a search may take."""
 
     low: float
@@ -85,7 +75,7 @@ class Interval(_Model):
         return self
 
 
-class Choices(_Model):
+class Choices(ConfigModel):
     """Values that a search may take."""
 
     choices: list[str | bool | int | float | None] = Field(min_length=2)
@@ -98,7 +88,7 @@ class Choices(_Model):
         return value
 
 
-class SearchModel(_Model):
+class SearchModel(ConfigModel):
     """Search of a space that is no grid of filters; needs Optuna."""
 
     space: dict[str, Interval | Choices] = Field(min_length=1, description="What each parameter may be, by its path.")
@@ -107,7 +97,7 @@ class SearchModel(_Model):
     seed: int = Field(default=0, ge=0, description="Of the sampler.")
 
 
-class TuneModel(_Model):
+class TuneModel(ConfigModel):
     """A tuning: a detector, what to vary, and captures to tune on and to hold out."""
 
     version: Literal[1] = Field(alias="schema", description="Version of this file format.")
@@ -128,10 +118,10 @@ class TuneModel(_Model):
         default=["material", "channel", "overall"], min_length=1, description="What is tuned separately."
     )
     scoring: Scoring = Field(default="frame", description="How detections are counted.")
-    table: Literal["filtering", "mapping"] = Field(
+    table: Table = Field(
         default="filtering", description="After which half of the chain; a grid is scored after filtering."
     )
-    gate_m: float = Field(default=0.20, gt=0, description="Largest error of a true detection.")
+    gate_m: GateRadius
     region: RegionModel = Field(default_factory=RegionModel)
     f1_tie: float = Field(default=0.001, ge=0, lt=1, description="Loss of F1 that a lower RMSE may make up for.")
     stable_within: float = Field(default=0.01, ge=0, lt=1, description="Loss of F1 that the stable zone allows.")
@@ -183,12 +173,7 @@ class Tuning:
     @property
     def rules(self) -> ScoringRules:
         """How sets are scored."""
-        region = self.model.region
-        return ScoringRules(
-            self.model.scoring,
-            self.model.gate_m,
-            Region(region.min_range_m, region.max_range_m, region.half_angle_rad),
-        )
+        return ScoringRules(self.model.scoring, self.model.gate_m, Region(**self.model.region.limits))
 
     @property
     def paths(self) -> tuple[str, ...]:
@@ -251,9 +236,10 @@ def read_tuning(
     path, source = read_given("tuning", name)
     data = with_values(source.data, changes, "--set") if changes else source.data
     model = checked(TuneModel, data, source)
-    is_file = model.detector.endswith((".yaml", ".yml")) or "/" in model.detector
-    with standing(source, ("detector",)):
-        use = str(find_config("detectors", model.detector, path.parent).resolve()) if is_file else model.detector
+    with placed(source, ("detector",)):
+        use = model.detector
+        if is_path(use):
+            use = str(find_config("detectors", use, path.parent).resolve())
         config = read_detector(use, None, model.set)
         Pipeline(config)
     roots = [str(root) for root in data_roots(data_dir, path)]
@@ -273,16 +259,16 @@ def _sweep(model: TuneModel, config: DetectorConfig, source: YamlFile) -> Sweep 
     if model.grid is None:
         assert model.search is not None  # noqa: S101
         for path in model.search.space:
-            with standing(source, ("search", "space", path)):
+            with placed(source, ("search", "space", path)):
                 with_values(config.to_dict(), {path: None}, "--set")
         return None
     grid = {path: given.values if isinstance(given, Steps) else given for path, given in model.grid.items()}
     for path, values in grid.items():  # one at a time, so that the message names the line
-        with standing(source, ("grid", path)):
+        with placed(source, ("grid", path)):
             Sweep(Pipeline(config), {path: values}, leave_out=behind_the_ranges(config))
     if math.prod(map(len, grid.values())) < 1:
         raise ConfigError(f"{source.place(('grid',))}: at least one threshold is needed")
-    with standing(source, ("grid",)):
+    with placed(source, ("grid",)):
         return Sweep(Pipeline(config), grid, leave_out=behind_the_ranges(config))
 
 
@@ -304,5 +290,5 @@ def _experiment(
     if model.experiment is None:
         return None
     beside = path.parent / model.experiment
-    with standing(source, ("experiment",)):
+    with placed(source, ("experiment",)):
         return read_experiment(beside if beside.is_file() else model.experiment, data_dir=data_dir)

@@ -11,13 +11,13 @@ import numpy as np
 from uwbbench.api.detections import Detections
 from uwbbench.api.errors import ScoringError
 from uwbbench.api.metric import Outcome
+from uwbbench.config.rules import IntervalModel
 from uwbbench.detect.pipeline import Pipeline
 from uwbbench.measure.accuracy.metrics.detection import F1
 from uwbbench.measure.accuracy.scoring import ScoringRules, outcomes
 from uwbbench.measure.accuracy.stats import Estimate, bootstrap
-from uwbbench.run.experiment import IntervalModel
 from uwbbench.tools.tune.captures import Labelled
-from uwbbench.tools.tune.sweep.scores import SetScores, set_scores
+from uwbbench.tools.tune.sweep.scores import RATIOS, SetScores, set_scores
 from uwbbench.tools.tune.sweep.sweep import Swept
 
 
@@ -54,7 +54,7 @@ class Result:
 def figures(scores: SetScores, index: int) -> dict[str, Any]:
     """Scores of one set as plain values."""
     counts = {name: int(getattr(scores, name)[index]) for name in ("tp", "fp", "fn")}
-    ratios = {name: float(getattr(scores, name)[index]) for name in ("f1", "precision", "recall", "rmse_m", "mae_m")}
+    ratios = {name: float(getattr(scores, name)[index]) for name in RATIOS}
     return {**ratios, **counts}
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from uwbbench.api.arrays import BoolArray, FloatArray
 from uwbbench.api.errors import ConfigError
+from uwbbench.api.text import printable
 from uwbbench.show.figures import style
 from uwbbench.tools.tune import Tuned, TuneOutcome
 from uwbbench.tools.tune.sheets import short
@@ -57,7 +58,7 @@ def draw_stable_zone(outcome: TuneOutcome) -> Figure:
             for axes in own[len(pairs) :]:
                 axes.set_visible(False)
             zone = "n/a" if tuned.zone is None else f"{tuned.zone.share:.1%}"
-            own[0].set_title(style.plain(f"{tuned.group.text}: stable zone {zone}"), loc="left")
+            own[0].set_title(printable(f"{tuned.group.text}: stable zone {zone}"), loc="left")
             if image is not None:
                 drawn.colorbar(image, ax=list(own), label="F1", shrink=0.9, pad=0.01)
         style.caption(drawn, _sentences(outcome))
@@ -88,7 +89,7 @@ def _panel(axes: Any, outcome: TuneOutcome, tuned: Tuned, pair: tuple[int, ...])
     ):
         places = np.unique(np.linspace(0, len(ticks) - 1, min(len(ticks), 5)).round().astype(int))
         axis.set_ticks(places, ["none" if ticks[at] is None else f"{ticks[at]:.3g}" for at in places])
-        name(style.plain(label))
+        name(printable(label))
     return image
 
 
@@ -115,7 +116,7 @@ def _curve(
     axes.plot([chosen], [f1[chosen]], "o", mfc="white", mec=style.BLACK, ms=5, zorder=4)
     places = np.unique(np.linspace(0, len(at) - 1, min(len(at), 7)).round().astype(int))
     axes.set_xticks(places, ["none" if thresholds[place] is None else f"{thresholds[place]:.3g}" for place in places])
-    axes.set_xlabel(style.plain(label))
+    axes.set_xlabel(printable(label))
     axes.set_ylabel("F1")
 
 

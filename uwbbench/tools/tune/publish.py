@@ -21,6 +21,7 @@ from uwbbench.tools.tune.captures import Labelled
 from uwbbench.tools.tune.evaluate import Result
 from uwbbench.tools.tune.execute import Tuned, TuneOutcome, variant
 from uwbbench.tools.tune.sheets import markdown
+from uwbbench.tools.tune.sweep.scores import RATIOS
 
 FORMAT, VERSION = "uwbbench-tuning", 1
 
@@ -143,7 +144,7 @@ def table_of(outcome: TuneOutcome) -> Any:
         scores, sets = tuned.scores, len(tuned.scores.tp)
         columns: dict[str, Any] = {"group": [tuned.group.name] * sets, "set": np.arange(sets)}
         columns |= {path: _storable(column) for path, column in tuned.columns.items()}
-        columns |= {name: getattr(scores, name) for name in ("f1", "precision", "recall", "rmse_m", "mae_m")}
+        columns |= {name: getattr(scores, name) for name in RATIOS}
         columns |= {name: getattr(scores, name) for name in ("tp", "fp", "fn")}
         columns["stable"] = [None] * sets if tuned.zone is None else tuned.zone.inside
         columns["chosen"] = np.arange(sets) == tuned.best

@@ -4,9 +4,16 @@ from __future__ import annotations
 
 from typing import Any
 
-from uwbbench.show.text.sheet import Sheet, escaped, interval, number, shown
+from uwbbench.api.text import one_line
+from uwbbench.measure.accuracy.metrics.detection import F1
+from uwbbench.show.text.numbers import number
+from uwbbench.show.text.quantity import Quantity
+from uwbbench.show.text.sheet import Sheet, escaped, shown
 from uwbbench.tools.tune.evaluate import Result
 from uwbbench.tools.tune.execute import TuneOutcome
+
+_F1 = Quantity.of("f1", F1)
+"""The metric that a tuning maximises."""
 
 
 def sheets(outcome: TuneOutcome) -> list[Sheet]:
@@ -20,11 +27,11 @@ def sheets(outcome: TuneOutcome) -> list[Sheet]:
             "tuned for",
             "sets",
             "captures",
-            "F1 before",
-            "F1 tuned",
+            f"{_F1.title} before",
+            f"{_F1.title} tuned",
             "held out",
-            "held-out F1 before",
-            "held-out F1 tuned",
+            f"held-out {_F1.title} before",
+            f"held-out {_F1.title} tuned",
             "held-out RMSE (cm)",
             "stable zone",
         ),
@@ -81,7 +88,7 @@ def markdown(outcome: TuneOutcome) -> str:
     """All tables as Markdown."""
     lines = [f"# {escaped(shown(outcome.tuning.name))}", ""]
     if outcome.tuning.model.description:
-        lines += [escaped(" ".join(outcome.tuning.model.description.split())), ""]
+        lines += [escaped(one_line(outcome.tuning.model.description)), ""]
     return "\n".join([*lines, *(sheet.markdown() for sheet in sheets(outcome))])
 
 
@@ -100,8 +107,8 @@ def _f1(result: Result | None) -> str:
     if result is None:
         return "n/a"
     if result.f1 is None:
-        return number(float(result.scores.f1[0]), 3)
-    return interval(result.f1.value, result.f1.low, result.f1.high, 3)
+        return _F1.text(float(result.scores.f1[0]))
+    return _F1.value_of(result.f1)
 
 
 def _value(value: Any) -> str:

@@ -34,10 +34,10 @@ class PlateParams(Params):
     diffuse_db: float = Field(-15.0, description="Scattering of a face that mirrors elsewhere, against the mirror.")
 
 
-def reflected(thing: SceneObject, frequency_hz: float) -> complex:
+def reflected(body: SceneObject, frequency_hz: float) -> complex:
     """Reflection coefficient of an object at normal incidence, less the fitted loss of real bodies of its material."""
-    loss_db = SHAPE_LOSS_DB.get(thing.material, 0.0)
-    return reflection(thing.material, frequency_hz, thing.thickness_m) * 10 ** (-loss_db / 20)
+    loss_db = SHAPE_LOSS_DB.get(body.material, 0.0)
+    return reflection(body.material, frequency_hz, body.thickness_m) * 10 ** (-loss_db / 20)
 
 
 class _Echo(Term[P]):
@@ -45,7 +45,7 @@ class _Echo(Term[P]):
 
     shapes: ClassVar[tuple[str, ...]]
 
-    def _echo(self, thing: SceneObject, view: View, *, bound: bool) -> tuple[FloatArray, FloatArray]:
+    def _echo(self, body: SceneObject, view: View, *, bound: bool) -> tuple[FloatArray, FloatArray]:
         """Points (frames, n, 3) of a perfectly conducting body, and what isotropic antennas exchange by them.
 
         With ``bound``, an upper bound of these amplitudes (frames, n) that costs less.
@@ -54,10 +54,10 @@ class _Echo(Term[P]):
 
     def _all(self, view: View, *, bound: bool) -> Paths | None:
         points, amplitudes = [], []
-        for column, thing in enumerate(view.objects):
-            if thing.shape in self.shapes:
-                where, amplitude = self._echo(thing, view, bound=bound)
-                material = reflected(thing, view.radar.center_frequency_hz)
+        for column, body in enumerate(view.objects):
+            if body.shape in self.shapes:
+                where, amplitude = self._echo(body, view, bound=bound)
+                material = reflected(body, view.radar.center_frequency_hz)
                 points.append(where)
                 amplitudes.append(material * amplitude * view.visibility[:, column, None])
         if not points:
@@ -66,8 +66,8 @@ class _Echo(Term[P]):
 
     def bound(self, view: View) -> float:
         """All echoes of a frame in phase, each at the most that its distance allows."""
-        found = self._all(view, bound=True)
-        return 0.0 if found is None else float(np.max(np.sum(np.abs(found.amplitude), axis=1)))
+        paths = self._all(view, bound=True)
+        return 0.0 if paths is None else float(np.max(np.sum(np.abs(paths.amplitude), axis=1)))
 
     def paths(self, view: View, rng: np.random.Generator) -> Paths | None:
         """One path for each face or body."""
@@ -82,9 +82,9 @@ class PlateEcho(_Echo[PlateParams]):
 
     shapes: ClassVar = ("plate", "box")
 
-    def _echo(self, thing: SceneObject, view: View, *, bound: bool) -> tuple[FloatArray, FloatArray]:
-        found = [self._face(face, view, bound=bound) for face in faces(thing)]
-        seen = [one for one in found if np.any(one[1])] or found[:1]
+    def _echo(self, body: SceneObject, view: View, *, bound: bool) -> tuple[FloatArray, FloatArray]:
+        echoes = [self._face(face, view, bound=bound) for face in faces(body)]
+        seen = [one for one in echoes if np.any(one[1])] or echoes[:1]
         return np.stack([where for where, _ in seen], axis=1), np.stack([amplitude for _, amplitude in seen], axis=1)
 
     def _face(self, face: Face, view: View, *, bound: bool) -> tuple[FloatArray, FloatArray]:
@@ -109,16 +109,16 @@ class CylinderEcho(_Echo[Params]):
 
     shapes: ClassVar = ("rod", "person")
 
-    def _echo(self, thing: SceneObject, view: View, *, bound: bool) -> tuple[FloatArray, FloatArray]:
-        radius_m, wavelength = thing.width_m / 2, view.radar.wavelength_m
-        offset = view.receiver_m - thing.center_m
+    def _echo(self, body: SceneObject, view: View, *, bound: bool) -> tuple[FloatArray, FloatArray]:
+        radius_m, wavelength = body.width_m / 2, view.radar.wavelength_m
+        offset = view.receiver_m - body.center_m
         across = np.linalg.norm(offset[:, :2], axis=1)
-        height = np.clip(offset[:, 2], -thing.height_m / 2, thing.height_m / 2)
+        height = np.clip(offset[:, 2], -body.height_m / 2, body.height_m / 2)
         with np.errstate(divide="ignore", invalid="ignore"):
             ahead = np.where(across[:, None] > radius_m, offset[:, :2] / across[:, None] * radius_m, 0.0)
-        points = thing.center_m + np.column_stack([ahead, height])
+        points = body.center_m + np.column_stack([ahead, height])
         range_m = _mean_range(points, view.transmitter_m, view.receiver_m)
-        edges = np.array([-1, 1]) * thing.height_m / 2 - offset[:, 2, None]
+        edges = np.array([-1, 1]) * body.height_m / 2 - offset[:, 2, None]
         upward = _side(edges, range_m, wavelength, bound=bound)
         mirror = wavelength / (8 * np.pi * range_m) * np.sqrt(2 * radius_m / (radius_m + range_m)) * upward
         mirror = np.where(across > radius_m, mirror, 0.0)  # the robot drives through it: nothing sensible to return
@@ -136,12 +136,12 @@ class PointEcho(_Echo[PointParams]):
 
     shapes: ClassVar = ("point",)
 
-    def _echo(self, thing: SceneObject, view: View, *, bound: bool) -> tuple[FloatArray, FloatArray]:
-        out = np.linalg.norm(thing.center_m - view.transmitter_m, axis=1)
-        back = np.linalg.norm(thing.center_m - view.receiver_m, axis=1)
+    def _echo(self, body: SceneObject, view: View, *, bound: bool) -> tuple[FloatArray, FloatArray]:
+        out = np.linalg.norm(body.center_m - view.transmitter_m, axis=1)
+        back = np.linalg.norm(body.center_m - view.receiver_m, axis=1)
         scale = view.radar.wavelength_m * np.sqrt(self.params.rcs_m2) / (4 * np.pi) ** 1.5
         amplitude = scale / np.maximum(out * back, 1e-6)
-        points = np.broadcast_to(thing.center_m, (len(view), 1, 3))
+        points = np.broadcast_to(body.center_m, (len(view), 1, 3))
         return points, amplitude[:, None]
 
 

@@ -24,7 +24,17 @@ class FrameGain(Term[FrameGainParams]):
     """
 
     def apply(self, responses: Responses, view: View, rng: np.random.Generator) -> Responses:
-        """Scale and turn each frame."""
+        """Scale and turn each frame.
+
+        Parameters
+        ----------
+        responses : Responses
+            Sum of all paths, arrays (frames, taps).
+        view : View
+            The same frames; gives their number alone.
+        rng : Generator
+            Draws the gain and, if it is random, the phase of each frame.
+        """
         factor = 10 ** (self.params.jitter_db * rng.standard_normal((len(view), 1)) / 20) + 0j
         if self.params.phase == "random":
             factor = factor * np.exp(2j * np.pi * rng.uniform(size=(len(view), 1)))

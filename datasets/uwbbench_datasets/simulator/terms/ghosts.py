@@ -48,10 +48,10 @@ class _Target:
 
     def amplitude(self, rng: np.random.Generator) -> ComplexArray:
         """Its strongest echo (frames,), with the phase of the reflection but not of the way."""
-        found = self.echo.paths(self.view, rng)
-        if found is None:
+        paths = self.echo.paths(self.view, rng)
+        if paths is None:
             return np.zeros(len(self.view), complex)
-        turned = found.amplitude * np.exp(2j * np.pi * self.view.radar.center_frequency_hz * found.delay_s)
+        turned = paths.amplitude * np.exp(2j * np.pi * self.view.radar.center_frequency_hz * paths.delay_s)
         return np.asarray(turned[np.arange(len(turned)), np.argmax(np.abs(turned), axis=1)])
 
     def bound(self) -> float:
@@ -60,14 +60,14 @@ class _Target:
 
 
 def _targets(view: View) -> Iterator[_Target]:
-    for column, thing in enumerate(view.objects):
+    for column, body in enumerate(view.objects):
         alone = view.replace(
-            objects=(thing,),
+            objects=(body,),
             visibility=view.visibility[:, [column]],
             receive_gain=lambda azimuth_rad: np.ones(np.shape(azimuth_rad)),
         )
         for echo in _ECHOES:
-            if thing.shape in echo.shapes:
+            if body.shape in echo.shapes:
                 yield _Target(alone, echo)
 
 

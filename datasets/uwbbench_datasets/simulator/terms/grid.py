@@ -38,12 +38,12 @@ class Grid(Term[GridParams]):
             If frames were lost or repeated before.
         """
         if len(capture) != len(self._crest_tap):
-            raise CaptureError("term 'grid' must stand before the terms that lose or repeat frames")
+            raise CaptureError("term 'grid' must come before the terms that lose or repeat frames")
         steps = self.params.resolution
 
         def reported() -> FloatArray:
-            found = self._crest_tap + self.params.error_taps * rng.standard_normal(len(self._crest_tap))
-            return np.asarray(np.round(found * steps) / steps)
+            tap = self._crest_tap + self.params.error_taps * rng.standard_normal(len(self._crest_tap))
+            return np.asarray(np.round(tap * steps) / steps)
 
         radar = dataclasses.replace(capture.radar, has_first_path=True)
         capture = dataclasses.replace(capture, radar=radar, first_path_index=reported())

@@ -18,7 +18,17 @@ class Clipping(Term[ClippingParams]):
     """Saturation: I and Q each stop at a level, as registers do."""
 
     def apply(self, responses: Responses, view: View, rng: np.random.Generator) -> Responses:
-        """Clip every response."""
+        """Clip every response.
+
+        Parameters
+        ----------
+        responses : Responses
+            Arrays (frames, taps).
+        view : View
+            Gives the amplitude of the direct path, the unit of the level.
+        rng : Generator
+            Not drawn from.
+        """
         limit = self.params.level * view.direct_amplitude
 
         def clipped(one: ComplexArray) -> ComplexArray:
@@ -41,7 +51,17 @@ class Quantisation(Term[QuantisationParams]):
         return float(self.params.full_scale * view.direct_amplitude / 2 ** (self.params.bits - 1))
 
     def apply(self, responses: Responses, view: View, rng: np.random.Generator) -> Responses:
-        """Round every response to the steps of two's complement numbers."""
+        """Round every response to the steps of two's complement numbers.
+
+        Parameters
+        ----------
+        responses : Responses
+            Arrays (frames, taps).
+        view : View
+            Gives the amplitude of the direct path, the unit of the full scale.
+        rng : Generator
+            Not drawn from.
+        """
         step, last = self._step(view), 2 ** (self.params.bits - 1)
 
         def rounded(one: ComplexArray) -> ComplexArray:

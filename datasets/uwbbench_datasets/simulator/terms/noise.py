@@ -34,7 +34,17 @@ class Noise(Term[NoiseParams]):
         return float(view.direct_amplitude * 10 ** (-self.params.snr_db / 20))
 
     def apply(self, responses: Responses, view: View, rng: np.random.Generator) -> Responses:
-        """Add noise, drawn apart for each response."""
+        """Add noise, drawn apart for each response.
+
+        Parameters
+        ----------
+        responses : Responses
+            Arrays (frames, taps).
+        view : View
+            Gives the direct path's amplitude, which the level refers to, and the radar's sample interval and bandwidth.
+        rng : Generator
+            Draws the noise: of the preamble first, then of both STS responses.
+        """
         rms = self.noise_rms(view)
         sts_rms = rms * 10 ** (self.params.sts_loss_db / 20)
 

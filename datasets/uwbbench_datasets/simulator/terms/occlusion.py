@@ -32,13 +32,13 @@ class Occlusion(Term[OcclusionParams]):
 
 def hidden(view: View) -> BoolArray:
     """Whether each object (frames, objects) is hidden from the receiver or the transmitter."""
-    found = np.zeros((len(view), len(view.objects)), bool)
+    blocked = np.zeros((len(view), len(view.objects)), bool)
     receiver, transmitter = view.receiver_m[:, :2], view.transmitter_m[:, :2]
-    opaque = [thing.obstacle.outline_m[..., :2] for thing in view.objects]
-    for column, thing in enumerate(view.objects):
+    opaque = [body.obstacle.outline_m[..., :2] for body in view.objects]
+    for column, body in enumerate(view.objects):
         point = nearest_on_outline(receiver, opaque[column])
         for other, outline in zip(view.objects, opaque, strict=True):
-            if other is not thing and len(outline) > 1:
-                found[:, column] |= segments_cross(receiver, point, outline)
-                found[:, column] |= segments_cross(transmitter, point, outline)
-    return found
+            if other is not body and len(outline) > 1:
+                blocked[:, column] |= segments_cross(receiver, point, outline)
+                blocked[:, column] |= segments_cross(transmitter, point, outline)
+    return blocked

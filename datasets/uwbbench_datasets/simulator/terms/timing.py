@@ -31,8 +31,8 @@ def taken(capture: Capture, frame: IntArray | BoolArray) -> Capture:
     track = capture.trajectory
     truth = capture.truth and Truth(
         tuple(
-            dataclasses.replace(thing, outline_m=thing.outline_m[frame]) if thing.moves else thing
-            for thing in capture.truth.objects
+            dataclasses.replace(obstacle, outline_m=obstacle.outline_m[frame]) if obstacle.moves else obstacle
+            for obstacle in capture.truth.objects
         ),
         capture.truth.exhaustive,
     )

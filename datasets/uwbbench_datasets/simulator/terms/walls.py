@@ -16,7 +16,7 @@ from uwbbench_datasets.simulator.terms.echo import face_echo
 
 def walls(view: View) -> Iterator[tuple[int, SceneObject]]:
     """Walls of a scene with their column among the objects."""
-    return ((column, thing) for column, thing in enumerate(view.objects) if thing.shape == "wall")
+    return ((column, body) for column, body in enumerate(view.objects) if body.shape == "wall")
 
 
 def mirrored(points_m: FloatArray, face: Face) -> FloatArray:
@@ -40,8 +40,8 @@ class WallEcho(Term[WallParams]):
 
     def bound(self, view: View) -> float:
         """All walls of a frame in phase, each at the most that its distance allows."""
-        found = self._all(view, bound=True)
-        return 0.0 if found is None else float(np.max(np.sum(np.abs(found.amplitude), axis=1)))
+        paths = self._all(view, bound=True)
+        return 0.0 if paths is None else float(np.max(np.sum(np.abs(paths.amplitude), axis=1)))
 
     def paths(self, view: View, rng: np.random.Generator) -> Paths | None:
         """One path for each side of each wall."""
@@ -103,16 +103,16 @@ class WallClutter(Term[ClutterParams]):
 
     def bound(self, view: View) -> float:
         """All scatterers of a frame in phase."""
-        largest = [np.max(np.sum(np.abs(found.amplitude), axis=1)) for found in self._each(view)]
+        largest = [np.max(np.sum(np.abs(paths.amplitude), axis=1)) for paths in self._each(view)]
         return float(np.sum(largest))
 
     def paths(self, view: View, rng: np.random.Generator) -> Paths | None:
         """One path for each scatterer, from the sides of walls that face the radar."""
-        found = list(self._each(view))
-        if not found:
+        parts = list(self._each(view))
+        if not parts:
             return None
         names = ("delay_s", "amplitude", "azimuth_rad")
-        return Paths(*(np.concatenate([getattr(one, name) for one in found], axis=1) for name in names))
+        return Paths(*(np.concatenate([getattr(one, name) for one in parts], axis=1) for name in names))
 
     def _each(self, view: View) -> Iterator[Paths]:
         for column, face, place, root in self._scatterers:

@@ -43,6 +43,11 @@ class Precision(Metric):
     nan
     """
 
+    title: ClassVar[str] = "precision"
+    needs_exhaustive_truth: ClassVar[bool] = True
+    default: ClassVar[bool] = True
+    order: ClassVar[int] = 10
+
     @staticmethod
     def partial(outcome: Outcome) -> FloatArray:
         """Counts tp, fp."""
@@ -71,6 +76,11 @@ class Recall(Metric):
     >>> Recall.value(np.array([3.0, 1.0])), Recall.value(np.array([0.0, 2.0]))
     (0.75, 0.0)
     """
+
+    title: ClassVar[str] = "recall"
+    default: ClassVar[bool] = True
+    order: ClassVar[int] = 20
+    headline: ClassVar[int | None] = 2
 
     @staticmethod
     def partial(outcome: Outcome) -> FloatArray:
@@ -103,6 +113,12 @@ class F1(Metric):
     0.0
     """
 
+    title: ClassVar[str] = "F1"
+    needs_exhaustive_truth: ClassVar[bool] = True
+    default: ClassVar[bool] = True
+    order: ClassVar[int] = 30
+    headline: ClassVar[int | None] = 1
+
     @staticmethod
     def partial(outcome: Outcome) -> FloatArray:
         """Counts tp, fp, fn."""
@@ -132,8 +148,13 @@ class FalseAlarmsPerMinute(Metric):
     2.0
     """
 
+    title: ClassVar[str] = "false alarms"
     unit: ClassVar[str] = "1/min"
     better: ClassVar[Literal["higher", "lower", "zero"]] = "lower"
+    needs_exhaustive_truth: ClassVar[bool] = True
+    default: ClassVar[bool] = True
+    order: ClassVar[int] = 80
+    brief: ClassVar[bool] = False
 
     @staticmethod
     def partial(outcome: Outcome) -> FloatArray:

@@ -60,6 +60,11 @@ class MeanAbsoluteError(_ErrorMetric):
     (0.2, nan)
     """
 
+    title: ClassVar[str] = "MAE"
+    default: ClassVar[bool] = True
+    order: ClassVar[int] = 40
+    headline: ClassVar[int | None] = 3
+
     @staticmethod
     def value(partial: FloatArray) -> float:
         """Mean absolute error."""
@@ -69,6 +74,20 @@ class MeanAbsoluteError(_ErrorMetric):
     def resampled(cls, partials: Sequence[FloatArray], counts: FloatArray) -> FloatArray:
         """Mean absolute errors of many resamples, from the sums of the groups."""
         return _mean(counts, [np.abs(part).sum() for part in partials], partials)
+
+
+class MatchedMeanAbsoluteError(MeanAbsoluteError):
+    """Mean of the absolute errors of true positives alone: read it with the recall, or a detector wins by missing."""
+
+    title: ClassVar[str] = "MAE of matches"
+    order: ClassVar[int] = 200
+    brief: ClassVar[bool] = False
+    headline: ClassVar[int | None] = None
+
+    @staticmethod
+    def partial(outcome: Outcome) -> FloatArray:
+        """Signed errors (n,) of the matched detections."""
+        return _ErrorMetric.partial(matched_only(outcome))
 
 
 class _Percentile(_ErrorMetric):
@@ -89,15 +108,15 @@ class _Percentile(_ErrorMetric):
         order = np.argsort(errors_m)
         errors_m, owner = errors_m[order], np.repeat(np.arange(len(partials)), sizes)[order]
         samples = counts @ sizes.astype(np.float64)
-        found = np.full(len(counts), math.nan)
+        quantiles_m = np.full(len(counts), math.nan)
         enough = samples >= samples_needed(quantile)
         if enough.any():
             place = quantile * (samples[enough] - 1)
             below = np.floor(place)
             above = np.minimum(below + 1, samples[enough] - 1)
             low_m, high_m = errors_m[_positions(owner, counts[enough], np.stack([below, above]))]
-            found[enough] = low_m + (place - below) * (high_m - low_m)
-        return found
+            quantiles_m[enough] = low_m + (place - below) * (high_m - low_m)
+        return quantiles_m
 
 
 def _positions(owner: IntArray, counts: FloatArray, ranks: FloatArray) -> IntArray:
@@ -113,14 +132,14 @@ def _positions(owner: IntArray, counts: FloatArray, ranks: FloatArray) -> IntArr
     # Single precision holds whole numbers up to 2^24, and is twice as fast.
     exact = np.float32 if counts.shape[1] * len(owner) < 2**24 else np.float64
     reached = counts.astype(exact) @ np.cumsum(held, axis=1).astype(exact)
-    found = np.empty(ranks.shape, np.int64)
-    for row, rank in zip(found, ranks, strict=True):
+    positions = np.empty(ranks.shape, np.int64)
+    for row, rank in zip(positions, ranks, strict=True):
         block = np.sum(reached <= rank[:, None].astype(exact), axis=1)
         before = np.take_along_axis(reached, np.maximum(block - 1, 0)[:, None], axis=1)
         places = np.minimum(block[:, None] * size + np.arange(size), len(owner) - 1)
         within = np.cumsum(np.take_along_axis(counts, owner[places], axis=1), axis=1)
         row[:] = block * size + np.sum(np.where(block[:, None] > 0, before, 0) + within <= rank[:, None], axis=1)
-    return found
+    return positions
 
 
 class Percentile90(_Percentile):
@@ -132,6 +151,9 @@ class Percentile90(_Percentile):
     (0.9, nan)
     """
 
+    title: ClassVar[str] = "P90"
+    default: ClassVar[bool] = True
+    order: ClassVar[int] = 50
     minimum_samples: ClassVar[int] = samples_needed(0.90)
 
     @staticmethod
@@ -148,6 +170,10 @@ class Percentile90(_Percentile):
 class Percentile95(_Percentile):
     """Absolute error that nineteen of twenty detections stay below; needs 72 samples."""
 
+    title: ClassVar[str] = "P95"
+    default: ClassVar[bool] = True
+    order: ClassVar[int] = 60
+    headline: ClassVar[int | None] = 4
     minimum_samples: ClassVar[int] = samples_needed(0.95)
 
     @staticmethod
@@ -171,6 +197,10 @@ class StandardDeviation(_ErrorMetric):
     >>> StandardDeviation.value(np.array([0.1, -0.3])).__round__(12)
     0.1
     """
+
+    title: ClassVar[str] = "SD"
+    default: ClassVar[bool] = True
+    order: ClassVar[int] = 70
 
     @staticmethod
     def value(partial: FloatArray) -> float:
@@ -197,6 +227,7 @@ class Bias(_ErrorMetric):
     -0.1
     """
 
+    order: ClassVar[int] = 90
     better: ClassVar[Literal["higher", "lower", "zero"]] = "zero"
 
     @staticmethod

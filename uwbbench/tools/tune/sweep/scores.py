@@ -16,6 +16,9 @@ from uwbbench.api.truth import Sight, Trajectory
 from uwbbench.measure.accuracy.judge import Scene, ScoringRules, judge
 from uwbbench.tools.tune.sweep.sweep import Swept
 
+RATIOS = ("f1", "precision", "recall", "rmse_m", "mae_m")
+"""What counts and sums are made into, as tables name it."""
+
 
 @dataclass(frozen=True)
 class SetScores:

@@ -8,29 +8,28 @@ from typing import Any
 
 import numpy as np
 
-from uwbbench.api.arrays import FloatArray, IntArray
-from uwbbench.api.detections import Detections
-from uwbbench.measure.robustness.case import Evidence, NotApplicable, Violation, case
-from uwbbench.measure.robustness.scene import TAPS
-from uwbbench.measure.robustness.subject import Subject, block_of, through
+from uwbbench.api import Detections, Evidence, FloatArray, IntArray, NotApplicable, StagesOnTrial, Violation, hard_case
+
+TAPS = StagesOnTrial.radar.taps
+
 
 UTM_M = (691_608.25, 5_334_763.5)
 """Easting and northing of a place in zone 32 U; a unit in the last place is 1e-9 m."""
 
 
-def _settings(subject: Subject) -> tuple[float, int]:
+def _settings(subject: StagesOnTrial) -> tuple[float, int]:
     params: Any = subject.stage("dbscan").params
     if params.window is not None:
         raise NotApplicable("the detector clusters a window of its points")
     return params.eps_m, params.min_samples
 
 
-def _clustered(subject: Subject, points_m: FloatArray) -> IntArray:
+def _clustered(subject: StagesOnTrial, points_m: FloatArray) -> IntArray:
     """Cluster of each point (n, 2), noise being -1, at the end of a stream."""
     stage = subject.stage("dbscan")
     rows = np.arange(len(points_m))
     found = Detections(rows, x_m=points_m[:, 0], y_m=points_m[:, 1], place=rows.astype(float))
-    ready = through(stage, block_of(np.ones((len(rows), TAPS), complex), detections=found)).detections
+    ready = subject.through(stage, subject.block_of(np.ones((len(rows), TAPS), complex), detections=found)).detections
     tail = stage.flush()
     parts = [ready] if tail is None else [ready, tail.detections]
     joined = Detections.join(parts)
@@ -75,8 +74,8 @@ def _same_partition(found: IntArray, expected: IntArray) -> None:
         raise Violation("points fall into other clusters")
 
 
-@case("equal")
-def map_coordinates(subject: Subject) -> Evidence:
+@hard_case("equal")
+def map_coordinates(subject: StagesOnTrial) -> Evidence:
     """Points around a UTM coordinate of five million metres fall into the same clusters as around the origin."""
     eps_m, min_samples = _settings(subject)
     rng = np.random.default_rng(29)
@@ -88,8 +87,8 @@ def map_coordinates(subject: Subject) -> Evidence:
     return Evidence(f"{len(set(found.tolist()) - {-1})} clusters in both places")
 
 
-@case("equal")
-def lattice_of_spacing_eps(subject: Subject) -> Evidence:
+@hard_case("equal")
+def lattice_of_spacing_eps(subject: StagesOnTrial) -> Evidence:
     """On a lattice whose spacing equals the radius, neighbours count, as the definition says: at most eps away.
 
     Nine sites with so many points on each that only the middle one, with its four neighbours, is a core point. Brute
@@ -106,8 +105,8 @@ def lattice_of_spacing_eps(subject: Subject) -> Evidence:
     return Evidence(f"{int(np.sum(expected >= 0))} of {len(points_m)} points in clusters")
 
 
-@case("equal")
-def lattice_just_too_wide(subject: Subject) -> Evidence:
+@hard_case("equal")
+def lattice_just_too_wide(subject: StagesOnTrial) -> Evidence:
     """On a lattice whose spacing exceeds the radius by a billionth, no neighbours count."""
     eps_m, min_samples = _settings(subject)
     wide = eps_m * (1 + 1e-9)
@@ -117,8 +116,8 @@ def lattice_just_too_wide(subject: Subject) -> Evidence:
     return Evidence(f"{len(points_m)} points, as the definition has them")
 
 
-@case("equal")
-def duplicate_points(subject: Subject) -> Evidence:
+@hard_case("equal")
+def duplicate_points(subject: StagesOnTrial) -> Evidence:
     """Points on top of each other are one cluster from ``min_samples`` of them on, and noise below."""
     eps_m, min_samples = _settings(subject)
     many = np.tile([1.0, 1.0], (3 * min_samples, 1))
@@ -128,8 +127,8 @@ def duplicate_points(subject: Subject) -> Evidence:
     return Evidence(f"{len(many)} points in one cluster, {len(few)} noise")
 
 
-@case("survive")
-def points_without_position(subject: Subject) -> Evidence:
+@hard_case("survive")
+def points_without_position(subject: StagesOnTrial) -> Evidence:
     """Points that are not a number take no part: they come out as noise, and the others as without them."""
     _, min_samples = _settings(subject)
     points_m = np.tile([1.0, 1.0], (3 * min_samples, 1))

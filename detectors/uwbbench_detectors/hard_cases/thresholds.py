@@ -6,21 +6,19 @@ import math
 
 import numpy as np
 
-from uwbbench.api.arrays import FloatArray
-from uwbbench.api.detections import Detections
-from uwbbench.measure.robustness.case import Evidence, NotApplicable, Violation, case
-from uwbbench.measure.robustness.scene import TAPS
-from uwbbench.measure.robustness.subject import Subject, block_of, through
+from uwbbench.api import Detections, Evidence, FloatArray, NotApplicable, StagesOnTrial, Violation, hard_case
+
+TAPS = StagesOnTrial.radar.taps
 
 
-def _least_detected(subject: Subject, noise: float) -> tuple[float, float]:
+def _least_detected(subject: StagesOnTrial, noise: float) -> tuple[float, float]:
     """Smallest amplitude of one cell that is detected over noise of equal cells, by bisection; and its score."""
     tap = TAPS // 2
 
     def score_db(amplitude: float) -> float | None:
         frame = np.full((1, TAPS), noise, complex)
         frame[0, tap] = amplitude
-        found = through(subject.stage("cfar", cells="all"), block_of(frame)).detections
+        found = subject.through(subject.stage("cfar", cells="all"), subject.block_of(frame)).detections
         hits = found["tap"] == tap
         return float(found["score_db"][hits][0]) if hits.any() else None
 
@@ -40,8 +38,8 @@ def _least_detected(subject: Subject, noise: float) -> tuple[float, float]:
     return high, at
 
 
-@case("equal")
-def noise_on_the_cfar_threshold(subject: Subject) -> Evidence:
+@hard_case("equal")
+def noise_on_the_cfar_threshold(subject: StagesOnTrial) -> Evidence:
     """The decision of a CFAR changes once, between two neighbouring numbers, at the same score for noise of any size.
 
     The threshold is found by bisection to the last place, over noise of amplitude 1 and 1e-9; the score there, cell
@@ -54,11 +52,11 @@ def noise_on_the_cfar_threshold(subject: Subject) -> Evidence:
     return Evidence(f"threshold at {one:.3f} dB", error_ulp=abs(one - other) / float(np.spacing(one)))
 
 
-@case("reject")
-def noise_level_everywhere(subject: Subject) -> Evidence:
+@hard_case("reject")
+def noise_level_everywhere(subject: StagesOnTrial) -> Evidence:
     """A frame whose cells all have one power holds nothing over the threshold of a CFAR, whatever their phases."""
     frame = 0.7 * np.exp(1j * np.pi / 2 * np.arange(TAPS))[None]
-    found = through(subject.stage("cfar"), block_of(frame)).detections
+    found = subject.through(subject.stage("cfar"), subject.block_of(frame)).detections
     if len(found):
         raise Violation(f"{len(found)} cells over the threshold")
     return Evidence("nothing detected")
@@ -72,8 +70,8 @@ _LIMITS = (
 )
 
 
-@case("equal")
-def values_on_a_filter_limit(subject: Subject) -> Evidence:
+@hard_case("equal")
+def values_on_a_filter_limit(subject: StagesOnTrial) -> Evidence:
     """A value on a filter's limit is kept, its neighbour beyond is dropped, and what is not a number is dropped.
 
     ``if value < limit: reject`` would let pass what is not a number.
@@ -94,24 +92,26 @@ def values_on_a_filter_limit(subject: Subject) -> Evidence:
     return Evidence(", ".join(told), error_ulp=0.0)
 
 
-def _kept(subject: Subject, name: str, column: str, values: list[float]) -> list[bool]:
+def _kept(subject: StagesOnTrial, name: str, column: str, values: list[float]) -> list[bool]:
     places = Detections(np.zeros(len(values), int), tap=np.arange(len(values)))
     found = places.with_columns(**{column: np.array(values)})
-    block = block_of(np.ones((1, TAPS), complex), detections=found)
-    left = through(subject.stage(name), block).detections["tap"]
+    block = subject.block_of(np.ones((1, TAPS), complex), detections=found)
+    left = subject.through(subject.stage(name), block).detections["tap"]
     return [bool(np.isin(place, left)) for place in range(len(values))]
 
 
-@case("reject")
-def score_against_no_noise(subject: Subject) -> Evidence:
+@hard_case("reject")
+def score_against_no_noise(subject: StagesOnTrial) -> Evidence:
     """Over a noise floor of zero nothing has a score, and the filter on scores keeps nothing.
 
     The ratio is infinite for the weakest ripple, and 0/0 for none.
     """
     values = Detections(np.zeros(3, int), tap=np.arange(3.0), amplitude=np.array([0.0, 1e-300, 1.0]))
-    block = block_of(np.ones((1, TAPS), complex), first_path=np.zeros(1), noise_rms=np.zeros(1), detections=values)
-    scored = through(subject.stage("score.snr", amplitude="raw"), block)
-    left = through(subject.stage("filter.snr"), scored).detections
+    block = subject.block_of(
+        np.ones((1, TAPS), complex), first_path=np.zeros(1), noise_rms=np.zeros(1), detections=values
+    )
+    scored = subject.through(subject.stage("score.snr", amplitude="raw"), block)
+    left = subject.through(subject.stage("filter.snr"), scored).detections
     if len(left):
         raise Violation(f"{len(left)} of 3 detections kept, with scores {left['score_db'].tolist()}")
     return Evidence("3 detections dropped")
@@ -120,8 +120,8 @@ def score_against_no_noise(subject: Subject) -> Evidence:
 DROWNING_DB = (120.0, 240.0)
 
 
-@case("equal")
-def direct_path_120_db_above_the_floor(subject: Subject) -> Evidence:
+@hard_case("equal")
+def direct_path_120_db_above_the_floor(subject: StagesOnTrial) -> Evidence:
     """Cells whose training cells do not reach a direct path 120 dB above the noise are judged as if it were not there.
 
     Taps and scores must be equal to the last bit, at 240 dB too. Running or prefix sums add the direct path in and take
@@ -133,11 +133,11 @@ def direct_path_120_db_above_the_floor(subject: Subject) -> Evidence:
     stage = subject.stage("cfar")
     reach = stage.params.training_taps + 2 * stage.params.guard_taps
     crest = 7
-    quiet = through(stage, block_of(noise)).detections
+    quiet = subject.through(stage, subject.block_of(noise)).detections
     for level_db in DROWNING_DB:
         loud = noise.copy()
         loud[:, crest] = 10 ** (level_db / 20)
-        found = through(subject.stage("cfar"), block_of(loud)).detections
+        found = subject.through(subject.stage("cfar"), subject.block_of(loud)).detections
         _same_beyond(found, quiet, crest + reach)
     return Evidence("taps and scores equal to the last bit", error_ulp=0.0)
 
@@ -150,8 +150,8 @@ def _same_beyond(found: Detections, expected: Detections, tap: int) -> None:
         raise Violation(f"nothing is detected behind tap {tap}, where an echo of 30 dB stands")
 
 
-@case("equal")
-def training_cells_summed(subject: Subject) -> Evidence:
+@hard_case("equal")
+def training_cells_summed(subject: StagesOnTrial) -> Evidence:
     """Scores of a CFAR over amplitudes that span 160 dB agree with exact sums of the training cells to 1e-12 dB.
 
     Every frame holds one cell to test and training cells of very different size; the reference sums with
@@ -163,7 +163,7 @@ def training_cells_summed(subject: Subject) -> Evidence:
     tap = TAPS // 2 + 2
     amplitude = 10 ** rng.uniform(-8, 0, (50, TAPS))
     amplitude[:, tap] = 1e3
-    found = through(stage, block_of(amplitude.astype(complex))).detections
+    found = subject.through(stage, subject.block_of(amplitude.astype(complex))).detections
     tested = found.take(found["tap"] == tap)
     if len(tested) != len(amplitude):
         raise Violation(f"{len(tested)} of {len(amplitude)} cells detected that tower over their training cells")

@@ -1,0 +1,55 @@
+"""Which metrics a run shows, in which order, and which one ranks."""
+
+import pytest
+
+from uwbbench.measure.accuracy.metrics.choice import Absent, MetricChoice
+
+DEFAULT = ["precision", "recall", "f1", "mae", "p90", "p95", "sd", "false_alarms_per_minute", "matched_mae"]
+
+
+def test_every_run_shows_the_default_metrics_in_their_own_order():
+    assert list(MetricChoice()) == DEFAULT
+
+
+def test_a_listed_metric_takes_its_own_place():
+    assert list(MetricChoice(["bias", "mae"])) == [*DEFAULT[:8], "bias", "matched_mae"]
+
+
+def test_open_truth_leaves_out_what_unmatched_detections_decide():
+    assert MetricChoice().defined(exhaustive=False) == ["recall", "mae", "p90", "p95", "sd", "matched_mae"]
+
+
+@pytest.mark.parametrize(
+    ("listed", "exhaustive", "ranks"),
+    [
+        ([], True, "f1"),
+        ([], False, "recall"),
+        (["p90"], True, "p90"),
+        (["precision"], False, "recall"),
+        (["bias", "sd"], True, "f1"),  # neither end of a bias is better
+        (["not-installed"], True, "f1"),
+    ],
+)
+def test_the_first_listed_metric_ranks_where_it_can(listed, exhaustive, ranks):
+    assert MetricChoice(listed).ranking(exhaustive=exhaustive) == ranks
+
+
+def test_listed_metrics_come_before_the_default_ones_where_room_is_short():
+    assert MetricChoice(["sd"]).headline(exhaustive=True) == ["sd", "f1", "recall", "mae", "p95"]
+    assert MetricChoice(["sd"]).compared(exhaustive=True) == ["sd", "f1", "recall", "mae"]
+    assert "false_alarms_per_minute" not in MetricChoice().brief
+    assert "false_alarms_per_minute" in MetricChoice(["false_alarms_per_minute"]).brief
+
+
+def test_a_listed_metric_that_is_not_installed_keeps_its_place_and_is_noted():
+    metrics = MetricChoice(["not-installed"])
+    assert metrics["not-installed"] is Absent
+    assert metrics.absent == ("not-installed",)
+    assert "no metric named 'not-installed' is installed" in metrics.notes[0]
+
+
+def test_a_class_that_is_no_metric_is_noted_and_left_out(install_plugin):
+    install_plugin("odd", {"metrics": {"odd": "odd_metric:Odd"}}, {"odd_metric.py": "class Odd: pass\n"})
+    metrics = MetricChoice()
+    assert list(metrics) == DEFAULT
+    assert "is no subclass of uwbbench.api.Metric" in metrics.notes[0]

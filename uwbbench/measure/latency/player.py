@@ -1,0 +1,162 @@
+"""A detector that is timed turn by turn, in whatever process it lives.
+
+What a turn is
+--------------
+* A turn is the time of the next frames of a capture, one frame a call. It lasts ``TURN_S`` or longer: thousands of
+  readings of the clock, and less than the time slice of another process.
+* It has ``TURN_FRAMES`` frames or more, so that work that comes every fifty, such as clustering, is part of every turn
+  and all turns are of about the same work; unless a detector is so slow that it would take longer than
+  ``LONGEST_TURN_S`` for them.
+* On a busy machine other processes take the core for milliseconds. Linux counts for each thread how long it waited for
+  its core; that time is no detector's, and is left out of the turn: with both cores busy, that halved the scatter of
+  blocks as long as a time slice. Processor time would do the same, but a detector that sleeps or waits for a file would
+  pass. What others did to the caches stays in. Where the system does not tell, nothing is left out.
+"""
+
+from __future__ import annotations
+
+import gc
+import hashlib
+import math
+from collections.abc import Sequence
+from functools import partial
+from time import perf_counter_ns
+
+import numpy as np
+
+from uwbbench.api.arrays import FloatArray
+from uwbbench.api.capture import Capture
+from uwbbench.api.errors import CaptureError
+from uwbbench.api.frames import Frames
+from uwbbench.detect.pipeline import Pipeline
+from uwbbench.measure.latency.counters import core_waits
+from uwbbench.measure.latency.loops import cut, stream_pass, warm_up
+from uwbbench.measure.latency.paced import paced_pass, responses_us
+from uwbbench.measure.latency.ratio import alternate
+
+TURN_S = 1.5e-3
+TURN_FRAMES = 64
+LONGEST_TURN_S = 0.25
+
+PROBED_S = 0.01
+"""Time after which a detector's speed is known well enough to choose the length of its turns."""
+
+
+class Player:
+    """A detector with preloaded frames of a capture, which it goes through one frame a call, again and again.
+
+    Parameters
+    ----------
+    pipeline : Pipeline
+    capture : Capture
+    whole : Frames
+        The preloaded frames.
+
+    Attributes
+    ----------
+    waited_s : list of float
+        Time in each turn during which other processes had the core; 0 where the system does not tell.
+
+    Raises
+    ------
+    CaptureError
+        If there are no frames.
+    """
+
+    def __init__(self, pipeline: Pipeline, capture: Capture, whole: Frames) -> None:
+        self.pipeline, self.capture, self.whole = pipeline, capture, whole
+        if not len(self.whole):
+            raise CaptureError(f"capture '{capture.name}' has no frames; there is nothing to time")
+        self.rewind()
+
+    @property
+    def content(self) -> str:
+        """SHA-256 of the loaded samples: players are only compared where it is the same."""
+        return hashlib.sha256(np.ascontiguousarray(self.whole.preamble).tobytes()).hexdigest()
+
+    def warm_up(self, windows: int) -> None:
+        """Run until the times settle, so many windows at most."""
+        warm_up(self.pipeline, self.capture, self.whole, windows)
+
+    def call_s(self) -> float:
+        """Median time of the first calls: enough of them to choose the length of turns."""
+        step = self.pipeline.open(self.capture).step
+        times_ns: list[int] = []
+        for frames in cut(self.whole.part(0, 1000), 1):
+            start_ns = perf_counter_ns()
+            step(frames)
+            times_ns.append(perf_counter_ns() - start_ns)
+            if sum(times_ns) > PROBED_S * 1e9:
+                break
+        return max(float(np.median(times_ns)), 1.0) * 1e-9
+
+    def turn(self, size: int) -> float:
+        """Time of the next ``size`` frames, in seconds; where too few are left, the capture starts again.
+
+        Opening a stream and cutting frames is not part of the time, nor is waiting for the core while other processes
+        have it, where the system tells. What the detector waits for by itself, such as a file, is.
+        """
+        size = min(size, len(self.whole))
+        if self._at + size > len(self.whole):
+            self._reopen()
+        calls = cut(self.whole.part(self._at, self._at + size), 1)
+        self._at += size
+        step = self._stream.step
+        gc.disable()  # without collecting first, which takes longer than a turn and empties the caches
+        try:
+            with core_waits() as waits_ns:
+                before_ns = waits_ns()
+                start_ns = perf_counter_ns()
+                for frames in calls:
+                    step(frames)
+                spent_ns = perf_counter_ns() - start_ns
+                waited_ns = waits_ns() - before_ns
+        finally:
+            gc.enable()
+        self.waited_s.append(waited_ns * 1e-9)
+        # A wait between the readings of the two clocks, beside the timed part, may exceed it: it is none of it.
+        return (spent_ns - waited_ns if waited_ns < spent_ns else spent_ns) * 1e-9
+
+    def rewind(self) -> None:
+        """Start the capture again, with a stream opened anew, and forget earlier turns."""
+        self.waited_s: list[float] = []
+        self._reopen()
+
+    def _reopen(self) -> None:
+        self._stream, self._at = self.pipeline.open(self.capture), 0
+
+    def responses_us(self, count: int, rate_hz: float, *, paced: bool) -> FloatArray:
+        """Response times (count,) of single frames, from the moment each is due to its answer.
+
+        Paced, frames come at the radar's rate, as on a robot; else each comes when the one before is answered, which
+        takes less time and finds warmer caches, and the queue that the radar's rate would make is computed.
+        """
+        if paced:
+            times_us, _ = paced_pass(self.pipeline, self.capture, self.whole, rate_hz, count / rate_hz)
+        else:
+            passes = -(-count // len(self.whole))
+            one_by_one = [stream_pass(self.pipeline, self.capture, self.whole)[0] for _ in range(passes)]
+            times_us = np.concatenate(one_by_one)[:count]
+        return responses_us(times_us, 1e6 / rate_hz)
+
+
+def turn_frames(call_s: Sequence[float]) -> int:
+    """Frames of a turn of detectors that take so long for a frame."""
+    frames = max(TURN_FRAMES, math.ceil(TURN_S / min(call_s)))
+    return max(1, min(frames, int(LONGEST_TURN_S / max(call_s))))
+
+
+def in_turns(players: Sequence[Player], size: int, blocks: int) -> FloatArray:
+    """Times (blocks, players, 2) of players that take turns on the same frames, from the start of the capture.
+
+    Parameters
+    ----------
+    players : sequence of Player
+        Warm: what is compiled in here would be part of the times.
+    size : int
+        Frames of a turn.
+    blocks : int
+    """
+    for player in players:
+        player.rewind()
+    return alternate([partial(player.turn, size) for player in players], blocks)
