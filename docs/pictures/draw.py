@@ -32,6 +32,10 @@ def main(folder: Path) -> None:
     shutil.copyfile(folder / "figures" / "pareto-1-frame-filtering-f1.svg", IMAGES / "speed-against-f1.svg")
     for name in ("radargram.png", "map.png", "stable-zone.png"):
         shrink(folder / name, IMAGES / name)
+    (IMAGES / "examples").mkdir(exist_ok=True)
+    for script in sorted((HERE.parents[1] / "examples").glob("*.py")):
+        subprocess.run([sys.executable, script, folder], check=True)  # noqa: S603 - our own
+        shrink(folder / f"{script.stem}.png", IMAGES / "examples" / f"{script.stem}.png")
 
 
 def shrink(source: Path, target: Path) -> None:

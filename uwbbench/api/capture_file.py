@@ -150,7 +150,7 @@ def open_capture(path: str | os.PathLike[str], receiver: str | None = None) -> C
 
     Parameters
     ----------
-    path : path
+    path : Path
         An ``.h5`` file in the capture format.
     receiver : str, optional
         Which receiver; may be left out where the file has one.
@@ -300,7 +300,7 @@ def write_capture(path: str | os.PathLike[str], *captures: Capture) -> None:
 
     Parameters
     ----------
-    path : path
+    path : Path
         File to write; an existing one is replaced.
     *captures : Capture
         Receivers of the same run; their ``radar.receiver`` names differ.

@@ -23,7 +23,7 @@ def checked(model: type[M], data: Any, source: YamlFile, at: Path_ = ()) -> M:
         Values.
     source : YamlFile
         Where they come from, for the message.
-    at : path
+    at : tuple of str or int
         Keys that lead to them in that file.
 
     Raises

@@ -284,7 +284,7 @@ def load_detector(
 
     Parameters
     ----------
-    name : str or path
+    name : str or Path
         A shipped or registered name, or a path to a detector YAML.
     relative_to : Path, optional
         Folder that a relative path starts from.
