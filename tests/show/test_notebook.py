@@ -204,7 +204,7 @@ def test_a_detector_shows_its_chain_with_parameters_and_what_is_optional():
 
 def test_a_step_that_was_put_in_says_for_what():
     found = detector_from_yaml("{schema: 1, name: short, pipeline: [{use: peaks}]}")
-    assert "put in for peaks" in shown(found).text
+    assert "inserted for peaks" in shown(found).text
 
 
 def test_names_are_escaped_and_cut(approach):
