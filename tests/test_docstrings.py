@@ -7,7 +7,11 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[1]
-FOLDERS = ("uwbbench/api", "detectors", "datasets")
+FOLDERS = (
+    *(f"uwbbench/{room}" for room in ("api", "config", "detect", "measure", "run")),
+    "detectors",
+    "datasets",
+)
 """Swept so far; the aim is ``("uwbbench", "detectors", "datasets")``."""
 
 LEAST = 3

@@ -44,7 +44,7 @@ def user_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """An empty cache folder of the user; what was told before is told again."""
     monkeypatch.delenv("UWBBENCH_CACHE_DIR", raising=False)
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
-    monkeypatch.setattr(compiled_files, "_told", set())
+    monkeypatch.setattr(compiled_files, "_warned", set())
     monkeypatch.setitem(sys.modules, "kernels", ModuleType("kernels"))  # as it is replaced in a test, gone after it
     return tmp_path / "cache" / "uwbbench" / "compiled"
 

@@ -115,7 +115,7 @@ class CheckResult:
 
 @dataclass(frozen=True)
 class Check:
-    """One thing that is asked of a subject.
+    """One requirement on a subject.
 
     Attributes
     ----------
@@ -231,7 +231,7 @@ def select(checks: Iterable[C], names: Sequence[str], what: str) -> list[C]:
     ConfigError
         If there is none of a name.
     """
-    known = {one.name: one for one in checks}
+    known = {check.name: check for check in checks}
     for name in names:
         if name not in known:
             raise ConfigError(f"no {what} named '{name}'.{nearest(name, known)}")

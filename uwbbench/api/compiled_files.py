@@ -37,7 +37,7 @@ from uwbbench.api.numba_internals import MachineCode, pickled
 VARIABLE = "UWBBENCH_CACHE_DIR"
 _DIGEST_BYTES = hashlib.sha256().digest_size
 _log = logging.getLogger("uwbbench")
-_told: set[str] = set()
+_warned: set[str] = set()
 
 
 class CompiledFiles(MachineCode):
@@ -75,12 +75,12 @@ class CompiledFiles(MachineCode):
             return super().load_overload(sig, target_context)
         except Exception as error:  # noqa: BLE001  # whatever is wrong with what was kept, it can be compiled again
             name = self._function.__qualname__
-            _tell(f"kept machine code of {name} cannot be used ({error!r}) and is compiled again")
+            _warn_once(f"kept machine code of {name} cannot be used ({error!r}) and is compiled again")
             return None
 
     def refuse(self, reason: str) -> None:
         """Say that machine code is not kept."""
-        _tell(f"machine code of {self._function.__qualname__} is not kept, as {reason}")
+        _warn_once(f"machine code of {self._function.__qualname__} is not kept, as {reason}")
 
     def load(self, key: tuple[Any, ...]) -> Any:
         """Entry of a key, or None."""
@@ -92,10 +92,10 @@ class CompiledFiles(MachineCode):
                 continue
             digest, data = content[:_DIGEST_BYTES], content[_DIGEST_BYTES:]
             if hashlib.sha256(data).digest() != digest:
-                _tell(f"{path} is damaged, and made again")
+                _warn_once(f"{path} is damaged, and made again")
                 continue
-            found, entry = pickle.loads(data)  # noqa: S301  # from a folder that was found safe
-            if found == key:
+            stored_key, entry = pickle.loads(data)  # noqa: S301  # from a folder that was found safe
+            if stored_key == key:
                 return entry
         return None
 
@@ -120,7 +120,7 @@ class CompiledFiles(MachineCode):
                 with contextlib.suppress(OSError):
                     partial.unlink(missing_ok=True)
         where = " and ".join(problems) or "no safe folder"
-        _tell(f"machine code is not kept, as {where} cannot be written; set {VARIABLE} to a folder that can")
+        _warn_once(f"machine code is not kept, as {where} cannot be written; set {VARIABLE} to a folder that can")
 
     def flush(self) -> None:
         """Forget all entries of this function."""
@@ -135,10 +135,10 @@ class CompiledFiles(MachineCode):
                     path.unlink()
 
 
-def _tell(text: str) -> None:
+def _warn_once(text: str) -> None:
     """Log a warning, once in a process."""
-    if text not in _told:
-        _told.add(text)
+    if text not in _warned:
+        _warned.add(text)
         _log.warning("%s", text)
 
 

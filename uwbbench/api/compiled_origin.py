@@ -2,9 +2,9 @@
 
 To the machine code of a function belongs all that its names meant when it was compiled: the functions that it calls,
 under the names that it calls them by, and those that they call; constants and arrays; the classes of its arguments,
-whose fields are places in memory to it and no longer names. Each is told by what it is in this process, and by the
-file it was written in, so that also decorators and whatever else stands there count. Python, numpy and numba itself
-are told by their versions.
+whose fields are places in memory to it and no longer names. Each is identified by what it is in this process, and by
+the file it was written in, so that also decorators and whatever else stands there count. Python, numpy and numba
+itself are identified by their versions.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from numba.extending import is_jitted
 from uwbbench.api.numba_internals import options_of
 
 _GIVEN = {"builtins", "copyreg", "math", "cmath", "numba", "numpy", "llvmlite"}
-"""Packages whose code is told by a version; not all of the standard library, whose names another module may have."""
+"""Packages whose code a version identifies; not all of the standard library, whose names another module may have."""
 _VERSIONS = f"numba {numba.__version__}, numpy {np.__version__}"  # that of Python is in the names of files
 
 
@@ -78,21 +78,21 @@ def _hashed(*values: object) -> str:
 
 def _origins(types: object) -> list[object]:
     """Classes and functions that argument types hold anywhere, in order: those that a pickle refers to."""
-    found: dict[object, None] = {}
+    origins: dict[object, None] = {}
 
     class Pickler(pickle.Pickler):
         def reducer_override(self, part: Any) -> Any:
             if not isinstance(part, type | FunctionType) or _is_given(part):
                 return NotImplemented
-            found[part] = None
+            origins[part] = None
             return str, ()  # nobody reads this pickle
 
     Pickler(io.BytesIO()).dump(types)
-    return list(found)
+    return list(origins)
 
 
 def _is_given(value: object) -> bool:
-    """Whether something is told by the version of Python, numpy or numba."""
+    """Whether the version of Python, numpy or numba identifies a value."""
     name = value.__name__ if isinstance(value, ModuleType) else getattr(value, "__module__", None)
     return isinstance(name, str) and name.partition(".")[0] in _GIVEN
 

@@ -69,7 +69,7 @@ def _compiled(function: F, options: dict[str, Any]) -> F:
     dispatcher = decorate(function)
     if is_jitted(dispatcher):  # numba hands the function itself back where compiling is switched off
         _functions.append(dispatcher)
-        if Path(inspect.getfile(function)).is_file():  # nothing tells a stale file of what was typed at a prompt
+        if Path(inspect.getfile(function)).is_file():  # what was typed at a prompt has no file to compare with
             keep(dispatcher, CompiledFiles(function, options))
     return cast("F", dispatcher)
 
@@ -77,4 +77,4 @@ def _compiled(function: F, options: dict[str, Any]) -> F:
 def compile_counts() -> CompileCounts:
     """Count what this process has compiled, and what it has loaded, so far."""
     counts = [counts_of(function) for function in _functions]
-    return CompileCounts(fresh=sum(one.fresh for one in counts), loaded=sum(one.loaded for one in counts))
+    return CompileCounts(fresh=sum(count.fresh for count in counts), loaded=sum(count.loaded for count in counts))

@@ -27,7 +27,7 @@ as_tuple: Any = to_fixed_tuple
 class MachineCode(_Cache):
     """Where numba looks for a function's machine code before it compiles it, and leaves it afterwards.
 
-    A subclass says where that is. A key tells argument types and processor, not what the function does.
+    A subclass says where that is. A key names argument types and processor, not what the function does.
     """
 
     cache_path = ""

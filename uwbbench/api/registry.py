@@ -68,18 +68,18 @@ def _package(distribution: Distribution | None) -> str:
 @cache
 def entries(kind: Group) -> dict[str, Entry]:
     """All registered names of a kind, sorted; imports nothing."""
-    found: dict[str, Entry] = {}
+    known: dict[str, Entry] = {}
     for point in sorted(entry_points(group=f"uwbbench.{kind}"), key=lambda point: point.name):
         mine = Entry(point.name, point.value, _package(point.dist))
-        other = found.get(point.name)
+        other = known.get(point.name)
         if other is None:
-            found[point.name] = mine
+            known[point.name] = mine
         elif (other.target, other.package) != (mine.target, mine.package):  # one distribution seen twice on the path
-            found[point.name] = Entry(other.name, other.target, other.package, (*other.rivals, mine.package))
+            known[point.name] = Entry(other.name, other.target, other.package, (*other.rivals, mine.package))
     for (of_kind, name), plugin in _registered.items():
         if of_kind == kind:
-            found[name] = Entry(name, f"{plugin.__module__}:{plugin.__qualname__}", HERE_ALONE)
-    return found
+            known[name] = Entry(name, f"{plugin.__module__}:{plugin.__qualname__}", HERE_ALONE)
+    return known
 
 
 def register(kind: Literal["stages", "datasets", "metrics", "terms"], name: str, plugin: type[Any]) -> None:
@@ -124,19 +124,20 @@ def entry(kind: Group, name: str) -> Entry:
     known = entries(kind)
     if name not in known:
         raise PluginError(f"no {kind[:-1]} named '{name}' is installed.{nearest(name, known)}")
-    found = known[name]
-    if found.rivals:
-        packages = ", ".join((found.package, *found.rivals))
+    registered = known[name]
+    if registered.rivals:
+        packages = ", ".join((registered.package, *registered.rivals))
         raise PluginError(f"{kind[:-1]} '{name}' is registered by several packages ({packages}); uninstall all but one")
-    return found
+    return registered
 
 
 def default(role: str) -> str:
     """Registered name of the plugin that fills a role where nobody names one.
 
     Roles are ``port.PORT``, the stage that makes a port; ``stage.idle``, which finds nothing, and ``stage.constant``,
-    which finds one thing in every frame; ``dataset.files`` and ``dataset.scenes``, which read capture files and scenes,
-    and ``dataset.limits``, the signals that physical limits are known of; ``detector.reference`` of relative times.
+    which yields one detection in every frame; ``dataset.files`` and ``dataset.scenes``, which read capture files and
+    scenes, and ``dataset.limits``, the signals that physical limits are known of; ``detector.reference`` of relative
+    times.
 
     Raises
     ------
@@ -163,23 +164,23 @@ def load_plugin(kind: ClassKind, name: str) -> type[Any]:
     """
     loaded = load_object(kind, name)
     if not isinstance(loaded, type):
-        found = entry(kind, name)
-        raise PluginError(f"{kind[:-1]} '{name}' of {found.package}: {found.target} is not a class")
+        registered = entry(kind, name)
+        raise PluginError(f"{kind[:-1]} '{name}' of {registered.package}: {registered.target} is not a class")
     return loaded
 
 
 def load_object(kind: ClassKind | Literal["cases"], name: str) -> Any:
     """Whatever is registered by a name, as :func:`load_plugin` does, which asks for a class."""
-    found = entry(kind, name)
-    if found.package == HERE_ALONE:
+    registered = entry(kind, name)
+    if registered.package == HERE_ALONE:
         return _registered[kind, name]
-    module, _, attribute = found.target.partition(":")
+    module, _, attribute = registered.target.partition(":")
     try:
         return getattr(importlib.import_module(module), attribute)
     except Exception as error:  # whatever a plugin's import raises is that plugin's fault alone
         cause = f"{type(error).__name__}: {error}"
         raise PluginError(
-            f"{kind[:-1]} '{name}' of {found.package} cannot be loaded from {found.target}: {cause}"
+            f"{kind[:-1]} '{name}' of {registered.package} cannot be loaded from {registered.target}: {cause}"
         ) from error
 
 
@@ -191,14 +192,14 @@ def detector_file(name: str) -> Path:
     PluginError
         If the name is unknown or claimed twice, or the file is not in the package.
     """
-    found = entry("detectors", name)
-    module, _, filename = found.target.partition(":")
+    registered = entry("detectors", name)
+    module, _, filename = registered.target.partition(":")
     try:
         spec = importlib.util.find_spec(module)
     except Exception as error:  # finding a module imports the packages above it, which may raise anything
-        raise PluginError(f"detector '{name}' of {found.package}: no package {module} ({error})") from error
+        raise PluginError(f"detector '{name}' of {registered.package}: no package {module} ({error})") from error
     folders = list(spec.submodule_search_locations or []) if spec else []
     for folder in folders:
         if (Path(folder) / filename).is_file():
             return Path(folder) / filename
-    raise PluginError(f"detector '{name}' of {found.package}: no file {filename} in package {module}")
+    raise PluginError(f"detector '{name}' of {registered.package}: no file {filename} in package {module}")

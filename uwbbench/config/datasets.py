@@ -95,16 +95,16 @@ def dataset_sources(
     ConfigError, PluginError
         If an adapter is unknown, a parameter wrong, or a label given twice.
     """
-    found: list[DatasetSource] = []
+    sources: list[DatasetSource] = []
     for index, item in enumerate(uses):
         at = (key, index)
         with placed(source, (*at, "use")):
             registry.load_plugin("datasets", item.use)
         open_dataset(item.use, item.params, [Path(root) for root in roots], source, (*at, "params"))
-        same = sum(other.use == item.use for other in found)
+        same = sum(other.use == item.use for other in sources)
         label = item.name or (f"{item.use} {same + 1}" if same else item.use)
-        if label in {other.label for other in found}:
+        if label in {other.label for other in sources}:
             raise ConfigError(f"{source.place(at)}: dataset '{label}' appears twice; give one of them another 'name'")
         patterns = None if item.captures is None else tuple(item.captures)
-        found.append(DatasetSource(label, item.use, item.params, patterns, tuple(roots)))
-    return tuple(found)
+        sources.append(DatasetSource(label, item.use, item.params, patterns, tuple(roots)))
+    return tuple(sources)

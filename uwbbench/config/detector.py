@@ -188,30 +188,29 @@ def check_detector(data: Mapping[str, Any], source: YamlFile) -> DetectorConfig:
         step = Step(item.use, label, params, item.optional, source.place(("pipeline", index)))
         _check_params(step, source, index)
         steps.append(step)
-    whole = tuple(_completed(steps))
-    return DetectorConfig(model.name, whole, model.description, model.citation, model.fidelity)
+    return DetectorConfig(model.name, tuple(_completed(steps)), model.description, model.citation, model.fidelity)
 
 
 def _completed(steps: list[Step]) -> list[Step]:
     """Steps with the implied ones put in directly before their first user."""
-    made = {"frames"}
+    produced = {"frames"}
     for step in steps:
-        made |= registry.load_plugin("stages", step.use).produces
+        produced |= registry.load_plugin("stages", step.use).produces
     taken = {step.label for step in steps}
-    whole: list[Step] = []
+    completed: list[Step] = []
 
     def put(step: Step) -> None:
-        for port in sorted(registry.load_plugin("stages", step.use).consumes - made):
+        for port in sorted(registry.load_plugin("stages", step.use).consumes - produced):
             use = _implied(port)
             if use is not None and use not in taken:
-                made.update(registry.load_plugin("stages", use).produces)
+                produced.update(registry.load_plugin("stages", use).produces)
                 taken.add(use)
                 put(Step(use, use, place=step.place, implied_by=step.label))
-        whole.append(step)
+        completed.append(step)
 
     for step in steps:
         put(step)
-    return whole
+    return completed
 
 
 def _implied(port: str) -> str | None:

@@ -49,6 +49,19 @@ def open_dataset(
 ) -> Dataset[Any]:
     """Dataset adapter with checked parameters.
 
+    Parameters
+    ----------
+    use : str
+        Registered name of the adapter.
+    params : mapping
+        Its parameters as written.
+    roots : sequence of Path
+        Folders to search for its files.
+    source : YamlFile, optional
+        The file that names the dataset, for messages.
+    at : tuple of str and int
+        Keys and indices that lead to ``params`` in that file.
+
     Raises
     ------
     PluginError, ConfigError
@@ -94,7 +107,7 @@ class CaptureRef:
     @classmethod
     def of_file(cls, path: Path, receiver: str | None = None) -> CaptureRef:
         """Reference to a capture file."""
-        whole = path.resolve()
-        params = {"files": [str(whole)], **({"receiver": receiver} if receiver else {})}
-        name = whole.stem if receiver is None else f"{whole.stem}/{receiver}"
-        return cls(registry.default("dataset.files"), params, (str(whole.parent),), name)
+        absolute = path.resolve()
+        params = {"files": [str(absolute)], **({"receiver": receiver} if receiver else {})}
+        name = absolute.stem if receiver is None else f"{absolute.stem}/{receiver}"
+        return cls(registry.default("dataset.files"), params, (str(absolute.parent),), name)

@@ -169,18 +169,18 @@ class Pipeline:
         """
         stream = self.open(capture, audit=candidates, fused=fused, threads=threads)
         parts = [stream.step(frames) for frames in capture.blocks(BATCH_FRAMES, sts="sts" in stream.needs)]
-        found = Detections.join([*parts, stream.flush()])
-        if not len(found):  # an empty table has the columns that a full one would have
-            found = found.with_columns(**{name: () for name in COLUMNS if name in stream.ports})
-        found = found.annotated(notes=stream.notes)
+        detections = Detections.join([*parts, stream.flush()])
+        if not len(detections):  # an empty table has the columns that a full one would have
+            detections = detections.with_columns(**{name: () for name in COLUMNS if name in stream.ports})
+        detections = detections.annotated(notes=stream.notes)
         if candidates:
-            return found.annotated(candidates=_candidates(found, stream.rejected), chain=stream.chain)
+            return detections.annotated(candidates=_candidates(detections, stream.rejected), chain=stream.chain)
 
         @cache
         def audited() -> Detections:
             return self.run(capture, candidates=True)
 
-        return found.annotated(
+        return detections.annotated(
             candidates=lambda: _known(audited().candidates),
             chain=(lambda: audited().chain) if stream.fused else stream.chain,
         )
@@ -212,32 +212,32 @@ class Pipeline:
     @property
     def sources(self) -> dict[str, str]:
         """SHA-256 of the sources of each stage, and of the kernels that may stand for some, by name."""
-        found = {
+        hashes = {
             step.use: source_hash(registry.load_plugin("stages", step.use).__module__) for step in self.config.steps
         }
         for name in registry.entries("kernels"):
             with contextlib.suppress(PluginError):  # one that cannot be loaded is not used
-                found[f"{KERNEL}{name}"] = source_hash(registry.load_plugin("kernels", name).__module__)
-        return found
+                hashes[f"{KERNEL}{name}"] = source_hash(registry.load_plugin("kernels", name).__module__)
+        return hashes
 
 
 def _makers_of(port: str) -> list[str]:
     """Installed stages that produce a port; those that cannot be loaded are passed over."""
-    found = []
+    makers = []
     for name in registry.entries("stages"):
         with contextlib.suppress(PluginError):
             if port in registry.load_plugin("stages", name).produces:
-                found.append(name)
-    return found
+                makers.append(name)
+    return makers
 
 
 def _known(candidates: Detections | None) -> Detections:
     return Detections.empty() if candidates is None else candidates
 
 
-def _candidates(found: Detections, rejected: Detections) -> Detections:
+def _candidates(detections: Detections, rejected: Detections) -> Detections:
     """Peaks before the filters, with ``retained`` 1 for those that passed them all, else ``rejected_by``."""
-    kept = found.with_columns(retained=np.ones(len(found)), rejected_by=np.full(len(found), np.nan))
+    kept = detections.with_columns(retained=np.ones(len(detections)), rejected_by=np.full(len(detections), np.nan))
     dropped = rejected.with_columns(retained=np.zeros(len(rejected)))
     return Detections.join([kept, dropped])
 
@@ -255,7 +255,7 @@ def _fused(steps: list[Opened], notes: list[str], threads: int) -> list[Opened]:
     while place < len(steps):
         stages = [step.stage for step in steps[place:]]
         covered, kernel = max(
-            ((kind.covers(stages), kind) for kind in kernels), key=lambda found: found[0], default=(0, None)
+            ((kind.covers(stages), kind) for kind in kernels), key=lambda pair: pair[0], default=(0, None)
         )
         if kernel is None or covered < 2 or _kept_inside(stages[:covered]) & _wanted(stages[covered:]):
             fused.append(steps[place])
@@ -269,8 +269,8 @@ def _fused(steps: list[Opened], notes: list[str], threads: int) -> list[Opened]:
 
 def _kept_inside(stages: list[Stage[Any]]) -> frozenset[str]:
     """Ports about frames that these stages make, which a kernel keeps to itself."""
-    made = frozenset[str]().union(*(stage.produces for stage in stages))
-    return made & {"first_path", "noise", "profile"}
+    produced = frozenset[str]().union(*(stage.produces for stage in stages))
+    return produced & {"first_path", "noise", "profile"}
 
 
 def _wanted(stages: list[Stage[Any]]) -> frozenset[str]:

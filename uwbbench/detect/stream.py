@@ -69,10 +69,10 @@ class Stream:
         """
         if self._kernel is None:
             return self._emit(self.through(Block(frames.without_invalid())))
-        found = self._kernel.detect(frames, None)
+        detections = self._kernel.detect(frames, None)
         if len(self._steps) == 1:
-            return found
-        return self._emit(self.through(Block(frames.without_invalid(), detections=found), 1))
+            return detections
+        return self._emit(self.through(Block(frames.without_invalid(), detections=detections), 1))
 
     def flush(self) -> Detections:
         """Detections that were still held back; ends the stream."""
@@ -96,10 +96,10 @@ class Stream:
     @property
     def stages(self) -> tuple[Stage[Any], ...]:
         """The stages at work, in order; those that a kernel stands for included."""
-        found: list[Stage[Any]] = []
+        stages: list[Stage[Any]] = []
         for step in self._steps:
-            found += step.stage.stages if isinstance(step.stage, Kernel) else [step.stage]
-        return tuple(found)
+            stages += step.stage.stages if isinstance(step.stage, Kernel) else [step.stage]
+        return tuple(stages)
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -163,10 +163,10 @@ class Stream:
 
 def _without_rows_of_invalid(block: Block) -> Block:
     """Block without detections of invalid frames, whatever a stage made of their zeros."""
-    frames, found = block.frames, block.detections
-    if frames.valid.all() or not len(found):
+    frames, detections = block.frames, block.detections
+    if frames.valid.all() or not len(detections):
         return block
-    return block.replace(detections=found.take(~np.isin(found.frame, frames.index[~frames.valid])))
+    return block.replace(detections=detections.take(~np.isin(detections.frame, frames.index[~frames.valid])))
 
 
 def _brought_along(part: Block, block: Block) -> Block:

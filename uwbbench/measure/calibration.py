@@ -114,12 +114,12 @@ def calibrate(detector: Pipeline, capture: Capture, gate_m: float = 1.0) -> Cali
     if capture.truth is None:
         raise ScoringError(f"capture '{capture.name}' has no ground truth, so nothing can be calibrated on it")
     sight = capture.truth.seen_from(capture.radar, capture.trajectory)
-    sought = np.array([not thing.structure for thing in capture.truth.objects], dtype=bool)
+    sought = np.array([not target.structure for target in capture.truth.objects], dtype=bool)
     ahead = np.abs(sight.azimuth_rad) <= np.pi / 2
     visible_m = np.where(ahead & ~sight.occluded & sought, sight.range_m, np.nan)
 
-    found = detector.run(capture)
-    error_m = found.range_m[:, None] - visible_m[found.frame]
+    detections = detector.run(capture)
+    error_m = detections.range_m[:, None] - visible_m[detections.frame]
     distance_m = np.where(np.isfinite(error_m), np.abs(error_m), np.inf)
     near = np.flatnonzero(distance_m.min(axis=1, initial=np.inf) <= gate_m)
     if len(near) < MINIMUM_MATCHES:
@@ -127,11 +127,11 @@ def calibrate(detector: Pipeline, capture: Capture, gate_m: float = 1.0) -> Cali
             f"detector '{detector.name}' has only {len(near)} detections within {gate_m:g} m of a visible object on "
             f"capture '{capture.name}'; calibration needs {MINIMUM_MATCHES}"
         )
-    thing = distance_m[near].argmin(axis=1)
-    azimuth_error = wrap_angle(found.azimuth_rad[near] - sight.azimuth_rad[found.frame[near], thing])
+    target = distance_m[near].argmin(axis=1)
+    azimuth_error = wrap_angle(detections.azimuth_rad[near] - sight.azimuth_rad[detections.frame[near], target])
     azimuth_error = azimuth_error[np.isfinite(azimuth_error)]
     return Calibration(
-        range_bias_m=float(np.median(error_m[near, thing])),
+        range_bias_m=float(np.median(error_m[near, target])),
         azimuth_bias_rad=float(np.median(azimuth_error)) if len(azimuth_error) >= MINIMUM_MATCHES else None,
         n=len(near),
         stages=_stages(detector, capture.radar.channel),
@@ -140,8 +140,8 @@ def calibrate(detector: Pipeline, capture: Capture, gate_m: float = 1.0) -> Cali
 
 def _stages(detector: Pipeline, channel: int | None) -> dict[str, Stage[Any]]:
     """A detector's stages with its parameters for a channel, not opened."""
-    found = {}
+    stages = {}
     for step in detector.config.steps:
         cls = registry.load_plugin("stages", step.use)
-        found[step.label] = cls(cls.params_type().model_validate(step.params_for(channel)[0]))
-    return found
+        stages[step.label] = cls(cls.params_type().model_validate(step.params_for(channel)[0]))
+    return stages

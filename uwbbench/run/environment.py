@@ -17,17 +17,17 @@ _PACKAGES = ("numpy", "scipy", "scikit-learn", "joblib", "pyarrow", "pandas", "h
 
 def versions() -> dict[str, str]:
     """Versions of Python, uwbbench, the libraries under it, and every package that registers a plugin."""
-    found = {"python": platform.python_version(), "uwbbench": __version__}
+    numbers = {"python": platform.python_version(), "uwbbench": __version__}
     for name in _PACKAGES:
         try:
-            found[name] = version(name)
+            numbers[name] = version(name)
         except PackageNotFoundError:
-            found[name] = "not installed"
+            numbers[name] = "not installed"
     for kind in registry.KINDS:
         for entry in registry.entries(kind).values():
             name, _, number = entry.package.rpartition(" ")
-            found.setdefault(name, number)
-    return found
+            numbers.setdefault(name, number)
+    return numbers
 
 
 def case_packages() -> list[str]:

@@ -224,7 +224,7 @@ class _Run:
 
     @property
     def _examinable(self) -> tuple[DetectorConfig, ...]:
-        """Detectors that the hard cases are put to."""
+        """Detectors to examine with the hard cases."""
         return self.experiment.detectors if self.experiment.stability else ()
 
     def _unexamined(self, before: dict[str, Entry]) -> list[DetectorConfig]:
@@ -233,7 +233,7 @@ class _Run:
         return [d for d in self._examinable if known.get(stability_name(d.name)) != identity_of_cases(d)]
 
     def _examine(self, detectors: list[DetectorConfig]) -> None:
-        """Put the hard cases to detectors; one that takes its process down does not take the others' results."""
+        """Examine detectors with the hard cases; one that takes its process down does not take the others' results."""
         remaining = {stability_name(detector.name): detector for detector in detectors}
         try:
             for entry in self._results(delayed(examined)(detector, os.getpid()) for detector in detectors):
@@ -258,7 +258,7 @@ class _Run:
                 results.close()
 
     def _pending(self, before: dict[str, Entry]) -> list[Unit]:
-        """Units to run: all but those that gave the same thing before."""
+        """Units to run: all but those that gave the same before."""
         maybe = [unit for unit in self.plan.units if unit.id in before and before[unit.id].status == "done"]
         captures = {unit.capture_id: unit for unit in maybe}
         jobs = [delayed(content_of)(self._job(unit)) for unit in captures.values()]
@@ -334,6 +334,6 @@ class _Run:
 
     def _write_scores(self) -> None:
         entries = self.folder.entries()
-        rows = {entry.unit: entry.scores for entry in entries if entry.status == "done"}
-        whole = with_metrics(self.folder, rows, self.rules, self.experiment.metrics)
-        self.folder.write_scores(table_of(entries, whole), self.rules)
+        scored = {entry.unit: entry.scores for entry in entries if entry.status == "done"}
+        rows = with_metrics(self.folder, scored, self.rules, self.experiment.metrics)
+        self.folder.write_scores(table_of(entries, rows), self.rules)

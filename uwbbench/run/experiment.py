@@ -197,7 +197,7 @@ def _anchored(item: Any, folder: Path) -> Any:
 def _detectors(model: ExperimentModel, source: YamlFile, folder: Path) -> tuple[DetectorConfig, ...]:
     from uwbbench.detect.pipeline import Pipeline
 
-    found: dict[str, DetectorConfig] = {}
+    configs: dict[str, DetectorConfig] = {}
     for index, item in enumerate(model.detectors):
         use = item if isinstance(item, DetectorUse) else DetectorUse(use="null" if item is None else item)
         at = ("detectors", index)
@@ -205,9 +205,9 @@ def _detectors(model: ExperimentModel, source: YamlFile, folder: Path) -> tuple[
             config = read_detector(use.use, folder, use.set)
             config = replace(config, name=use.name or config.name)
             Pipeline(config)  # checks that its steps fit together
-        if config.name in found:
+        if config.name in configs:
             raise ConfigError(
                 f"{source.place(at)}: detector '{config.name}' appears twice; give one of them another 'name'"
             )
-        found[config.name] = config
-    return tuple(found.values())
+        configs[config.name] = config
+    return tuple(configs.values())

@@ -42,7 +42,16 @@ def examined(detector: DetectorConfig, parent: int) -> Entry:
 
 
 def failed(detector: DetectorConfig, reason: str = "", trace: str = "") -> Entry:
-    """Entry of a detector that could not be examined."""
+    """Entry of a detector that could not be examined.
+
+    Parameters
+    ----------
+    detector : DetectorConfig
+    reason : str
+        In one line.
+    trace : str
+        Traceback of what it raised.
+    """
     return Entry(
         unit=stability_name(detector.name),
         kind="stability",

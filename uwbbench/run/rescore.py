@@ -27,10 +27,10 @@ def rescore(folder: RunFolder, rules: Sequence[ScoringRules] | None = None) -> N
     """
     chosen = folder.rules if rules is None else list(rules)
     entries = folder.entries()
-    rows = {
+    scored = {
         entry.unit: score_rows(folder.detections(entry.unit), folder.header(entry.capture_id), chosen)
         for entry in entries
         if entry.kind == "accuracy" and entry.status == "done"
     }
-    whole = with_metrics(folder, rows, chosen, folder.manifest["experiment"]["metrics"])
-    folder.write_scores(table_of(entries, whole), chosen)
+    rows = with_metrics(folder, scored, chosen, folder.manifest["experiment"]["metrics"])
+    folder.write_scores(table_of(entries, rows), chosen)

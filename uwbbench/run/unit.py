@@ -116,19 +116,19 @@ def _detected(job: Job) -> Finished:
     capture = _opened(job.session, unit.ref)
     with_candidates = any(rule.scoring == "peak" for rule in job.rules)
     pipeline = Pipeline(unit.detector)
-    found = pipeline.run(capture)
-    candidates = found.candidates if with_candidates else None
+    detections = pipeline.run(capture)
+    candidates = detections.candidates if with_candidates else None
     header = capture.header
     facts = {
         "source": header.source,
         "frames": len(header),
-        "processed": len(found.processed),
-        "detections": len(found),
+        "processed": len(detections.processed),
+        "detections": len(detections),
         "exhaustive": None if header.truth is None else header.truth.exhaustive,
         "materials": _materials(header),
         "channel": header.radar.channel,
-        "notes": list(found.notes),
-        "chain": dict(found.chain),
+        "notes": list(detections.notes),
+        "chain": dict(detections.chain),
         "sha256": capture.sha256,
     }
     entry = entry_of(
@@ -136,10 +136,10 @@ def _detected(job: Job) -> Finished:
         "done",
         identity=accuracy_identity(pipeline.identity, capture.sha256, job.rules),
         capture_id=unit.capture_id,
-        scores=score_rows(found, header, job.rules),
+        scores=score_rows(detections, header, job.rules),
         facts=facts,
     )
-    return Finished(entry, _bare(found), None if candidates is None else _bare(candidates), header, capture.sha256)
+    return Finished(entry, _bare(detections), None if candidates is None else _bare(candidates), header, capture.sha256)
 
 
 def entry_of(unit: Unit, status: Status, **values: Any) -> Entry:
@@ -156,11 +156,11 @@ def entry_of(unit: Unit, status: Status, **values: Any) -> Entry:
 
 
 def _materials(header: CaptureHeader) -> list[str]:
-    things: Sequence[Any] = header.truth.objects if header.truth else ()
-    return sorted({thing.material for thing in things if not thing.structure})
+    objects: Sequence[Any] = header.truth.objects if header.truth else ()
+    return sorted({item.material for item in objects if not item.structure})
 
 
-def _bare(found: Detections) -> Detections:
+def _bare(detections: Detections) -> Detections:
     """Detections without the means to find candidates later, which would drag the capture between processes."""
-    columns: dict[str, Any] = found.columns
-    return Detections(**columns, processed=found.processed, notes=found.notes, chain=found.chain)
+    columns: dict[str, Any] = detections.columns
+    return Detections(**columns, processed=detections.processed, notes=detections.notes, chain=detections.chain)

@@ -175,7 +175,7 @@ def test_a_line_taken_out_of_the_journal_is_missed(run: Path) -> None:
         ("accuracy", {"unit": "../../../etc/passwd"}, "the name of its files is not that of what it is about"),
         ("accuracy", {"capture_id": "../../secret"}, "its capture is not the one that it names"),
         ("accuracy", {"status": "excellent"}, "status must be done or failed, not excellent"),
-        ("accuracy", {"facts": {"detections": 7000}}, "tells 7000 detections, stored are"),
+        ("accuracy", {"facts": {"detections": 7000}}, "states 7000 detections, stored are"),
         ("accuracy", {"facts": {"source": "measured"}}, "its capture is simulated"),
         ("accuracy", {"scores": []}, "has 0 rows of scores"),
         ("accuracy", {"scores": 5}, "does not hold what a run of this version writes"),

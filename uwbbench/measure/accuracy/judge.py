@@ -159,7 +159,7 @@ class Scene:
     unprocessed: int
 
     @classmethod
-    def of(cls, found: Detections, header: CaptureHeader) -> Scene:
+    def of(cls, detections: Detections, header: CaptureHeader) -> Scene:
         """Scene of a capture for a detector's output.
 
         Raises
@@ -170,21 +170,21 @@ class Scene:
         truth, frames = header.truth, len(header)
         if truth is None:
             raise ScoringError(f"capture '{header.name}' has no ground truth; it can be detected on, but not scored")
-        for index in (found.frame, found.processed):
+        for index in (detections.frame, detections.processed):
             outside = index[(index < 0) | (index >= frames)]
             if len(outside):
                 raise ScoringError(
                     f"the detections name frame {outside[0]}, but capture '{header.name}' has {frames} frames; "
                     "they come from another capture"
                 )
-        if len(found) and "range_m" not in found:
+        if len(detections) and "range_m" not in detections:
             raise ScoringError("the detections have no range_m; add the stage 'range' to the detector")
         sight = truth.seen_from(header.radar, header.trajectory)
         labelled = np.isfinite(sight.range_m) & np.isfinite(sight.azimuth_rad)
-        obstacle = np.array([not thing.structure for thing in truth.objects], bool)
+        obstacle = np.array([not item.structure for item in truth.objects], bool)
         known = labelled.all(axis=1) if truth.exhaustive else (labelled & obstacle).any(axis=1)
         processed = np.zeros(frames, bool)
-        processed[found.processed] = True
+        processed[detections.processed] = True
         return cls(header, truth, sight, labelled, obstacle, known & processed, int(np.sum(known & ~processed)))
 
     def inside(self, region: Region) -> BoolArray:
@@ -197,14 +197,14 @@ class Scene:
         ahead = np.abs(self.sight.azimuth_rad) <= region.widest_rad(self.header.radar)
         return self.inside(region) & ahead & ~self.sight.occluded & self.obstacle & self.labelled
 
-    def errors_m(self, found: Detections, table: Table) -> FloatArray:
+    def errors_m(self, detections: Detections, table: Table) -> FloatArray:
         """Error (n, objects) of each detection against each object; NaN where the object is not labelled."""
         if table == "filtering":
-            error = found.range_m[:, None] - self.sight.range_m[found.frame]
+            error = detections.range_m[:, None] - self.sight.range_m[detections.frame]
         else:
-            points_m = np.stack([found["x_m"], found["y_m"]], axis=1)
-            error = self.truth.distance_to(points_m, found.frame)
-        return np.where(self.labelled[found.frame], error, np.nan)
+            points_m = np.stack([detections["x_m"], detections["y_m"]], axis=1)
+            error = self.truth.distance_to(points_m, detections.frame)
+        return np.where(self.labelled[detections.frame], error, np.nan)
 
     def group(self) -> IntArray:
         """Resampling group of each frame: equal times of at least :data:`BLOCK_S`, the same for all detectors."""
@@ -235,8 +235,18 @@ class Verdict:
     chance_recall: float
 
 
-def judge(found: Detections, scene: Scene, rules: ScoringRules, table: Table) -> Verdict:
+def judge(detections: Detections, scene: Scene, rules: ScoringRules, table: Table) -> Verdict:
     """Judge every detection of a table, by the conventions above.
+
+    Parameters
+    ----------
+    detections : Detections
+        All of a capture; for ``peak`` with their candidates, the peaks before the filters.
+    scene : Scene
+        Of the same capture and detections.
+    rules : ScoringRules
+    table : {"filtering", "mapping"}
+        Errors in range, or in position of the clustered detections.
 
     Raises
     ------
@@ -245,7 +255,7 @@ def judge(found: Detections, scene: Scene, rules: ScoringRules, table: Table) ->
     """
     frames, exhaustive = len(scene.header), scene.truth.exhaustive
     visible = scene.visible(rules.region)
-    clustered = found.take(found["cluster"] >= 0) if table == "mapping" else found
+    clustered = detections.take(detections["cluster"] >= 0) if table == "mapping" else detections
     kept = _strongest(_in_region(clustered, scene, rules, table), rules)
     error_m = scene.errors_m(kept, table)
     near = np.abs(error_m) <= rules.gate_m
@@ -278,7 +288,7 @@ def judge(found: Detections, scene: Scene, rules: ScoringRules, table: Table) ->
     else:
         missed = (there > 0) & ((retained if exhaustive else tp) == 0)
         if rules.scoring == "peak":
-            missed &= _has_true_candidate(found, scene, rules, table)
+            missed &= _has_true_candidate(detections, scene, rules, table)
         fn = missed.astype(np.int64)
     index = np.flatnonzero(scene.scored)
     outcome = Outcome(
@@ -302,23 +312,23 @@ def judge(found: Detections, scene: Scene, rules: ScoringRules, table: Table) ->
     )
 
 
-def _in_region(found: Detections, scene: Scene, rules: ScoringRules, table: Table) -> Detections:
+def _in_region(detections: Detections, scene: Scene, rules: ScoringRules, table: Table) -> Detections:
     """Detections of scored frames in the region: those near labelled objects share their objects' place."""
-    found = found.take(scene.scored[found.frame])
+    detections = detections.take(scene.scored[detections.frame])
     low, high = rules.region.limits_m(scene.header.radar)
-    near = np.abs(scene.errors_m(found, table)) <= rules.gate_m
-    beside = (near & scene.inside(rules.region)[found.frame]).any(axis=1)
-    alone = (found.range_m >= low) & (found.range_m <= high)
-    return found.take(np.where(near.any(axis=1), beside, alone))
+    near = np.abs(scene.errors_m(detections, table)) <= rules.gate_m
+    beside = (near & scene.inside(rules.region)[detections.frame]).any(axis=1)
+    alone = (detections.range_m >= low) & (detections.range_m <= high)
+    return detections.take(np.where(near.any(axis=1), beside, alone))
 
 
-def _strongest(found: Detections, rules: ScoringRules) -> Detections:
+def _strongest(detections: Detections, rules: ScoringRules) -> Detections:
     """Detections ordered by frame and falling amplitude, no more in a frame than the rules allow."""
-    weakness = np.nan_to_num(-found["amplitude"], nan=np.inf)
-    found = found.take(np.lexsort((weakness, found.frame)))
+    weakness = np.nan_to_num(-detections["amplitude"], nan=np.inf)
+    detections = detections.take(np.lexsort((weakness, detections.frame)))
     most = 1 if rules.scoring == "frame" else rules.strongest
-    rank = np.arange(len(found)) - np.searchsorted(found.frame, found.frame)
-    return found if most is None else found.take(rank < most)
+    rank = np.arange(len(detections)) - np.searchsorted(detections.frame, detections.frame)
+    return detections if most is None else detections.take(rank < most)
 
 
 def _nearest(error_m: FloatArray, among: BoolArray) -> FloatArray:
@@ -330,9 +340,9 @@ def _nearest(error_m: FloatArray, among: BoolArray) -> FloatArray:
     return smallest
 
 
-def _has_true_candidate(found: Detections, scene: Scene, rules: ScoringRules, table: Table) -> BoolArray:
+def _has_true_candidate(detections: Detections, scene: Scene, rules: ScoringRules, table: Table) -> BoolArray:
     """Frames (frames,) in which a peak before the filters lies within the gate of a visible obstacle."""
-    candidates = found.candidates
+    candidates = detections.candidates
     if candidates is None:
         raise ScoringError(
             "peak scoring asks what the filters removed, and these detections do not carry the peaks before the "

@@ -188,12 +188,12 @@ def score(
     return Scores(rules, blocks["filtering"], blocks.get("mapping"), kept)
 
 
-def outcomes(found: Detections, header: CaptureHeader, rules: ScoringRules) -> dict[str, Outcome]:
+def outcomes(detections: Detections, header: CaptureHeader, rules: ScoringRules) -> dict[str, Outcome]:
     """Outcome of each table, to merge over captures and to resample.
 
     Parameters
     ----------
-    found : Detections
+    detections : Detections
     header : CaptureHeader
     rules : ScoringRules
 
@@ -207,41 +207,41 @@ def outcomes(found: Detections, header: CaptureHeader, rules: ScoringRules) -> d
     ScoringError
         As :func:`score`.
     """
-    scene = Scene.of(found, header)
-    return {table: judge(found, scene, rules, table).outcome for table in tables_of(found)}
+    scene = Scene.of(detections, header)
+    return {table: judge(detections, scene, rules, table).outcome for table in tables_of(detections)}
 
 
-def tables_of(found: Detections) -> tuple[Table, ...]:
+def tables_of(detections: Detections) -> tuple[Table, ...]:
     """Tables that detections can be judged by: ``mapping`` only where they are clustered."""
-    mapped = all(column in found for column in ("cluster", "x_m", "y_m"))
+    mapped = all(column in detections for column in ("cluster", "x_m", "y_m"))
     return ("filtering", "mapping") if mapped else ("filtering",)
 
 
-def _block(found: Detections, scene: Scene, rules: ScoringRules, table: Table, verdict: Verdict) -> ScoreBlock:
+def _block(detections: Detections, scene: Scene, rules: ScoringRules, table: Table, verdict: Verdict) -> ScoreBlock:
     everywhere = dataclasses.replace(rules, region=dataclasses.replace(rules.region, min_range_m=0.0))
-    whole, matched = [verdict.outcome], [matched_only(verdict.outcome)]
+    judged, matched = [verdict.outcome], [matched_only(verdict.outcome)]
     return ScoreBlock(
-        precision=evaluate(Precision, whole),
-        recall=evaluate(Recall, whole),
-        f1=evaluate(F1, whole),
-        mae_m=evaluate(MeanAbsoluteError, whole),
-        p90_m=evaluate(Percentile90, whole),
-        p95_m=evaluate(Percentile95, whole),
-        sd_m=evaluate(StandardDeviation, whole),
+        precision=evaluate(Precision, judged),
+        recall=evaluate(Recall, judged),
+        f1=evaluate(F1, judged),
+        mae_m=evaluate(MeanAbsoluteError, judged),
+        p90_m=evaluate(Percentile90, judged),
+        p95_m=evaluate(Percentile95, judged),
+        sd_m=evaluate(StandardDeviation, judged),
         tp=int(verdict.outcome.tp.sum()),
         fp=int(verdict.outcome.fp.sum()),
         fn=int(verdict.outcome.fn.sum()),
         retained=len(verdict.outcome.error_m),
         matched_mae_m=evaluate(MeanAbsoluteError, matched),
         matched_p90_m=evaluate(Percentile90, matched),
-        bias_m=evaluate(Bias, whole),
+        bias_m=evaluate(Bias, judged),
         true_empty=verdict.true_empty,
         duplicates=verdict.duplicates,
         structure=verdict.structure,
         unmatched=verdict.unmatched,
         chance_recall=verdict.chance_recall,
-        false_alarms_per_minute=evaluate(FalseAlarmsPerMinute, whole),
-        recall_with_blind_zone=evaluate(Recall, [judge(found, scene, everywhere, table).outcome]),
+        false_alarms_per_minute=evaluate(FalseAlarmsPerMinute, judged),
+        recall_with_blind_zone=evaluate(Recall, [judge(detections, scene, everywhere, table).outcome]),
         frames=len(verdict.outcome.group),
         unprocessed=scene.unprocessed,
         exhaustive=scene.truth.exhaustive,

@@ -22,12 +22,13 @@ from numpy.typing import ArrayLike
 
 from uwbbench.api.arrays import BoolArray, FloatArray, IntArray
 from uwbbench.api.metric import Metric, Outcome
+from uwbbench.measure.accuracy.groups import groups_of, taken
 
 MINIMUM_GROUPS = 8
 """Fewer groups than this give no interval."""
 
 DEFINED_SHARE = 0.95
-"""Share of the resamples in which a metric must be defined; with less, its interval would only tell of the rest."""
+"""Share of the resamples in which a metric must be defined; with less, its interval would describe the rest alone."""
 
 
 @dataclass(frozen=True)
@@ -110,16 +111,12 @@ def bootstrap(
     -------
     Estimate
     """
-    (groups,) = _groups([outcomes])
+    (groups,) = groups_of([outcomes], MINIMUM_GROUPS)
     partials = [metric.partial(group) for group in groups]
     value = metric.value(merge(metric, partials)) if partials else math.nan
     low, high = _interval(_draws(metric, [partials], resamples, seed)[:, 0], confidence)
     few = tuple(metric.value(part) for part in partials) if len(groups) < MINIMUM_GROUPS else ()
-    if metric.merge == "stack":
-        n = sum(len(part) for part in partials)
-    else:
-        n = 0 if math.isnan(value) else sum(len(group.group) for group in groups)
-    return Estimate(value, low, high, n, len(groups), few)
+    return Estimate(value, low, high, _samples(metric, outcomes, value), len(groups), few)
 
 
 def paired_difference(
@@ -158,14 +155,14 @@ def paired_difference(
     """
     if len(first) != len(second):
         raise ValueError(f"a paired comparison needs the same captures, not {len(first)} and {len(second)}")
-    pair = [[metric.partial(group) for group in groups] for groups in _groups([first, second])]
+    pair = [[metric.partial(group) for group in groups] for groups in groups_of([first, second], MINIMUM_GROUPS)]
     values = evaluate(metric, first), evaluate(metric, second)
     drawn = _draws(metric, pair, resamples, seed)
     differences = drawn[:, 0] - drawn[:, 1]
     low, high = _interval(differences, confidence)
     few: tuple[float, ...] = ()
     if len(pair[0]) < MINIMUM_GROUPS:
-        few = tuple(metric.value(one) - metric.value(other) for one, other in zip(*pair, strict=True))
+        few = tuple(metric.value(left) - metric.value(right) for left, right in zip(*pair, strict=True))
     return Difference(
         value=values[0] - values[1],
         low=low,
@@ -195,7 +192,7 @@ def paired_draws(
     (resamples, detectors) array
         Each row is of one draw of groups, the same for all detectors; no rows where there are too few groups.
     """
-    partials = [[metric.partial(group) for group in groups] for groups in _groups(list(series))]
+    partials = [[metric.partial(group) for group in groups] for groups in groups_of(list(series), MINIMUM_GROUPS)]
     return _draws(metric, partials, resamples, seed)
 
 
@@ -204,7 +201,7 @@ def subset(outcome: Outcome, frames: BoolArray) -> Outcome:
     rows = np.flatnonzero(frames)
     position = np.empty(len(outcome.group), np.int64)
     position[rows] = np.arange(len(rows))
-    return _taken(outcome, rows, np.flatnonzero(frames[outcome.error_frame]), position)
+    return taken(outcome, rows, np.flatnonzero(frames[outcome.error_frame]), position)
 
 
 def holm(p_values: ArrayLike) -> FloatArray:
@@ -326,54 +323,6 @@ def _samples(metric: type[Metric], outcomes: Sequence[Outcome], value: float) ->
     if metric.merge == "stack":
         return sum(len(metric.partial(outcome)) for outcome in outcomes)
     return 0 if math.isnan(value) else sum(len(outcome.group) for outcome in outcomes)
-
-
-def _groups(series: list[Sequence[Outcome]]) -> list[list[Outcome]]:
-    """Each detector's outcomes of every group; the groups are the same for all detectors."""
-    scored = [captures for captures in zip(*series, strict=True) if any(len(one.group) for one in captures)]
-    if len(scored) >= MINIMUM_GROUPS:
-        return [[captures[number] for captures in scored] for number in range(len(series))]
-    parts: list[list[Outcome]] = [[] for _ in series]
-    for captures in scored:
-        blocks = np.unique(np.concatenate([one.group for one in captures]))
-        for into, one in zip(parts, captures, strict=True):
-            into += _split(one, blocks)
-    return parts
-
-
-def _split(outcome: Outcome, blocks: IntArray) -> list[Outcome]:
-    """Parts of one outcome, one for each of the given blocks."""
-    frames = _members(outcome.group, blocks)
-    errors = _members(outcome.group[outcome.error_frame], blocks)
-    position = np.empty(len(outcome.group), np.int64)
-    parts = []
-    for rows, found in zip(frames, errors, strict=True):
-        position[rows] = np.arange(len(rows))
-        parts.append(_taken(outcome, rows, found, position))
-    return parts
-
-
-def _taken(outcome: Outcome, rows: IntArray, found: IntArray, position: IntArray) -> Outcome:
-    """Outcome of some frames and their detections; ``position`` holds the new row of each frame."""
-    return Outcome(
-        group=outcome.group[rows],
-        tp=outcome.tp[rows],
-        fp=outcome.fp[rows],
-        fn=outcome.fn[rows],
-        error_frame=position[outcome.error_frame[found]],
-        error_m=outcome.error_m[found],
-        matched=outcome.matched[found],
-        duration_s=outcome.duration_s * len(rows) / len(outcome.group) if len(rows) else 0.0,
-        exhaustive=outcome.exhaustive,
-    )
-
-
-def _members(group: IntArray, blocks: IntArray) -> list[IntArray]:
-    """Positions of each block's entries in ``group``, in order."""
-    order = np.argsort(group, kind="stable")
-    starts = np.searchsorted(group[order], blocks, side="left")
-    ends = np.searchsorted(group[order], blocks, side="right")
-    return [order[start:end] for start, end in zip(starts, ends, strict=True)]
 
 
 def _draws(metric: type[Metric], series: list[list[FloatArray]], resamples: int, seed: int) -> FloatArray:

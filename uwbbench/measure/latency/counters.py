@@ -114,11 +114,11 @@ class Usage:
 
     @classmethod
     def now(cls) -> Usage | None:
-        """Counts so far; None where the operating system does not tell."""
+        """Counts so far; None where the operating system does not report them."""
         if sys.platform == "win32":
             return None
-        found = resource.getrusage(resource.RUSAGE_SELF)
-        return cls(found.ru_minflt, found.ru_majflt, found.ru_nvcsw, found.ru_nivcsw)
+        usage = resource.getrusage(resource.RUSAGE_SELF)
+        return cls(usage.ru_minflt, usage.ru_majflt, usage.ru_nvcsw, usage.ru_nivcsw)
 
     def since(self, before: Usage) -> dict[str, int]:
         """What has been counted since an earlier moment."""

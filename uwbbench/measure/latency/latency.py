@@ -60,10 +60,10 @@ class Latency:
         Most calls in a row that took longer.
     clustering, plain : dict or None
         Calls in which the detector clustered, and the others (``n``, ``share``, ``p50_us``, ``p90_us``, ``p95_us``,
-        ``p99_us``, ``mean_us``, ``max_us``); None where it does not tell.
+        ``p99_us``, ``mean_us``, ``max_us``); None where it does not count them.
     ratio_to_reference : dict or None
         Time relative to a reference detector over alternating blocks: ``reference``, and what
-        :func:`~uwbbench.measure.latency.ratio.ratio_summary` tells, with ``disturbed_blocks``: in how many of the
+        :func:`~uwbbench.measure.latency.ratio.ratio_summary` gives, with ``disturbed_blocks``: in how many of the
         blocks other processes had the core for a while.
     paced : dict or None
         Frames handed out at a fixed rate (:func:`~uwbbench.measure.latency.paced.paced_summary`); None where not asked
@@ -120,7 +120,7 @@ class Latency:
     pinned: bool
     cpu: str
     notes: list[str] = field(default_factory=list)
-    # Values of a record may be missing in runs that were stored before it told them: they have defaults.
+    # Values of a record may be missing in runs that were stored before it held them: they have defaults.
     missed_share_low: float | None = None
     missed_share_high: float | None = None
     clock_us: float | None = None
@@ -195,7 +195,7 @@ def longest_run(marked: BoolArray) -> int:
 
 
 def kinds_summary(times_us: FloatArray, clustered: BoolArray | None) -> dict[str, dict[str, Any] | None]:
-    """Calls that clustered apart from the others; None for both where the detector does not tell."""
+    """Calls that clustered apart from the others; None for both where the detector does not count them."""
     if clustered is None:
         return {"clustering": None, "plain": None}
     return {

@@ -28,17 +28,17 @@ def versions() -> dict[str, str]:
 
 
 def load() -> float | None:
-    """Processes that ran or waited for a core, mean of the last minute; None where the system does not tell."""
+    """Processes that ran or waited for a core, mean of the last minute; None where the system does not say."""
     return os.getloadavg()[0] if hasattr(os, "getloadavg") else None
 
 
 def governor(root: Path = Path("/sys/devices/system/cpu")) -> str | None:
-    """Rule by which the first core's frequency is chosen; None where the system does not tell."""
+    """Rule by which the first core's frequency is chosen; None where the system does not say."""
     return _line(root / "cpu0/cpufreq/scaling_governor")
 
 
 def turbo(root: Path = Path("/sys/devices/system/cpu")) -> bool | None:
-    """Whether cores may run above their nominal frequency; None where the system does not tell."""
+    """Whether cores may run above their nominal frequency; None where the system does not say."""
     boost, no_turbo = _line(root / "cpufreq/boost"), _line(root / "intel_pstate/no_turbo")
     if boost is not None:
         return boost == "1"

@@ -24,7 +24,7 @@ LIMIT_S = 1.5
 
 
 def peak_bytes() -> int:
-    """Largest resident size so far, by the operating system; 0 where it does not tell."""
+    """Largest resident size so far, by the operating system; 0 where it does not report it."""
     try:
         import resource
     except ImportError:  # Windows
@@ -34,18 +34,26 @@ def peak_bytes() -> int:
 
 
 def resident_bytes() -> int | None:
-    """Resident size now, in whole pages; None where the operating system does not tell."""
+    """Resident size now, in whole pages; None where the operating system does not report it."""
     statm = Path("/proc/self/statm")
     if not statm.is_file():
         return None
     return int(statm.read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
 
 
-def growth(pipeline: Pipeline, capture: Capture, whole: Frames) -> dict[str, float | int | None]:
+def growth(pipeline: Pipeline, capture: Capture, preloaded: Frames) -> dict[str, float | int | None]:
     """What one long stream keeps of every thousand frames once it has settled.
 
     Two streams are run, as watching allocations takes memory itself: one for the resident size, one for the objects.
     A detector that builds a map keeps its points, and is expected to grow by them.
+
+    Parameters
+    ----------
+    pipeline : Pipeline
+        Warmed up before.
+    capture : Capture
+    preloaded : Frames
+        Of the capture; gone through again and again.
 
     Returns
     -------
@@ -54,22 +62,22 @@ def growth(pipeline: Pipeline, capture: Capture, whole: Frames) -> dict[str, flo
         ``resident_growth_bytes``: resident size of the process, which has the grain of pages and holds what the
         allocator keeps, None where unknown; ``growth_frames``: frames between the two readings of the first.
     """
-    resident, _ = _grown(pipeline, capture, whole, resident_bytes)
+    resident, _ = _grown(pipeline, capture, preloaded, resident_bytes)
     tracemalloc.start()
     try:
-        held, frames = _grown(pipeline, capture, whole, lambda: tracemalloc.get_traced_memory()[0])
+        held, frames = _grown(pipeline, capture, preloaded, lambda: tracemalloc.get_traced_memory()[0])
     finally:
         tracemalloc.stop()
     return {"memory_growth_bytes": held, "resident_growth_bytes": resident, "growth_frames": frames}
 
 
 def _grown(
-    pipeline: Pipeline, capture: Capture, whole: Frames, reading: Callable[[], int | None]
+    pipeline: Pipeline, capture: Capture, preloaded: Frames, reading: Callable[[], int | None]
 ) -> tuple[float | None, int]:
     """Growth of a reading for 1 000 frames of one stream, and the frames that it was seen over."""
     stream = pipeline.open(capture)
     step = stream.step
-    source = endless(whole, 1 / capture.radar.frame_rate_hz, renumbered="truth" not in stream.needs)
+    source = endless(preloaded, 1 / capture.radar.frame_rate_hz, renumbered="truth" not in stream.needs)
 
     def run(frames: int, limit_s: float) -> int:
         until = perf_counter() + limit_s

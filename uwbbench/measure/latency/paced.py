@@ -4,8 +4,7 @@ Conventions
 -----------
 * A frame is due at a fixed time. The loop sleeps until shortly before, then watches the clock, as a sleep alone ends
   some 0.1 ms late. What it starts late nevertheless is the harness's lateness: kept apart, never the detector's.
-* A frame is made after the sleep, as by a driver that has just received it: its samples are the only thing that is not
-  cold.
+* A frame is made after the sleep, as by a driver that has just received it: only its samples are not cold.
 * The deadline of a frame is the next frame. A detector that takes longer makes the next frame wait, and the wait
   counts: the response of a frame is its call and what earlier calls left undone when it was due.
 """
@@ -33,7 +32,7 @@ LATE_START_US = 10.0
 
 
 def paced_pass(
-    pipeline: Pipeline, capture: Capture, whole: Frames, rate_hz: float, seconds: float
+    pipeline: Pipeline, capture: Capture, preloaded: Frames, rate_hz: float, seconds: float
 ) -> tuple[FloatArray, FloatArray]:
     """Hand out frames at a rate, for a while, to one stream.
 
@@ -42,7 +41,7 @@ def paced_pass(
     pipeline : Pipeline
         Warmed up before.
     capture : Capture
-    whole : Frames
+    preloaded : Frames
         Preloaded; starts again where it is shorter than that.
     rate_hz, seconds : float
 
@@ -54,7 +53,7 @@ def paced_pass(
         From the moment at which the call could have started (the frame was due and the detector free) to its start.
     """
     stream = pipeline.open(capture)
-    step, source = stream.step, endless(whole, 1 / rate_hz, renumbered="truth" not in stream.needs)
+    step, source = stream.step, endless(preloaded, 1 / rate_hz, renumbered="truth" not in stream.needs)
     count = max(1, round(seconds * rate_hz))
     period_ns, spin_ns = 1e9 / rate_hz, min(SPIN_S, 0.25 / rate_hz) * 1e9
     times_ns, lateness_ns = np.empty(count), np.empty(count)
@@ -87,16 +86,23 @@ def responses_us(times_us: FloatArray, period_us: float) -> FloatArray:
     >>> responses_us(np.array([1.0, 15.0, 1.0, 1.0]), period_us=10.0).tolist()
     [1.0, 15.0, 6.0, 1.0]
     """
-    found = np.empty(len(times_us))
+    answers_us = np.empty(len(times_us))
     left_us = 0.0
     for number, time_us in enumerate(times_us):
-        found[number] = left_us + time_us
-        left_us = max(0.0, found[number] - period_us)
-    return found
+        answers_us[number] = left_us + time_us
+        left_us = max(0.0, answers_us[number] - period_us)
+    return answers_us
 
 
 def paced_summary(times_us: FloatArray, lateness_us: FloatArray, rate_hz: float) -> dict[str, Any]:
     """Numbers of a paced pass.
+
+    Parameters
+    ----------
+    times_us, lateness_us : (frames,) array
+        As :func:`paced_pass` returns them.
+    rate_hz : float
+        At which the frames were handed out.
 
     Returns
     -------

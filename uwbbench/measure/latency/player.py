@@ -12,7 +12,7 @@ What a turn is
 * On a busy machine other processes take the core for milliseconds. Linux counts for each thread how long it waited for
   its core; that time is no detector's, and is left out of the turn: with both cores busy, that halved the scatter of
   blocks as long as a time slice. Processor time would do the same, but a detector that sleeps or waits for a file would
-  pass. What others did to the caches stays in. Where the system does not tell, nothing is left out.
+  pass. What others did to the caches stays in. Where the system does not count that, nothing is left out.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ class Player:
     Attributes
     ----------
     waited_s : list of float
-        Time in each turn during which other processes had the core; 0 where the system does not tell.
+        Time in each turn during which other processes had the core; 0 where the system does not count it.
 
     Raises
     ------
@@ -97,8 +97,8 @@ class Player:
         """Time of ``size`` frames, in seconds: of the first stream, then of the second on the same, then of the next.
 
         Where too few frames are left, the capture starts again. Opening streams and cutting frames is not part of the
-        time, nor is waiting for the core while other processes have it, where the system tells. What the detector waits
-        for by itself, such as a file, is.
+        time, nor is waiting for the core while other processes have it, where the system counts that. What the detector
+        waits for by itself, such as a file, is.
         """
         if not self._again and self._at + size > len(self.whole):
             self._reopen()
@@ -136,6 +136,14 @@ class Player:
 
         Paced, frames come at the radar's rate, as on a robot; else each comes when the one before is answered, which
         takes less time and finds warmer caches, and the queue that the radar's rate would make is computed.
+
+        Parameters
+        ----------
+        count : int
+            Frames.
+        rate_hz : float
+            At which they are due, or taken to be.
+        paced : bool
         """
         if paced:
             times_us, _ = paced_pass(self.pipeline, self.capture, self.whole, rate_hz, count / rate_hz)

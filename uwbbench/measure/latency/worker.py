@@ -62,34 +62,34 @@ def _measured(spec: dict[str, Any], core: int | None) -> dict[str, Any]:
     pipeline = _pipeline(spec["detector"])
     opening = perf_counter()
     capture = CaptureRef(**{**spec["capture"], "roots": tuple(spec["capture"]["roots"])}).open()
-    whole = capture.frames(0, spec["frames"])
+    preloaded = capture.frames(0, spec["frames"])
     opening_s = perf_counter() - opening
-    if len(whole) == 0:
+    if len(preloaded) == 0:
         raise CaptureError(f"capture '{capture.name}' has no frames; there is nothing to time")
     stream = pipeline.open(capture)
-    stream.step(whole.part(0, 1))
+    stream.step(preloaded.part(0, 1))
     startup_s = perf_counter() - spec["started"] - opening_s
 
-    warmed = loops.warm_up(pipeline, capture, whole, spec["warmup_windows"])
+    warmed = loops.warm_up(pipeline, capture, preloaded, spec["warmup_windows"])
     notes = [] if warmed else ["warm-up windows never agreed within 5 %"]
-    if len(capture) > len(whole):
-        notes.append(f"timed the first {len(whole)} of {len(capture)} frames")
-    calls, compiled_in_calls = _calls(pipeline, capture, whole)
+    if len(capture) > len(preloaded):
+        notes.append(f"timed the first {len(preloaded)} of {len(capture)} frames")
+    calls, compiled_in_calls = _calls(pipeline, capture, preloaded)
     peak_memory_bytes = memory.peak_bytes()
-    batch_us, compiled_in_batch = undisturbed(lambda: loops.batch_times_us(pipeline, capture, whole))
-    paced, compiled_in_paced = _paced(pipeline, capture, whole, spec)
+    batch_us, compiled_in_batch = undisturbed(lambda: loops.batch_times_us(pipeline, capture, preloaded))
+    paced, compiled_in_paced = _paced(pipeline, capture, preloaded, spec)
     preempted = calls["quality"].get("involuntary_switches", 0)
     if preempted > 0.01 * calls["n"]:
         notes.append(f"other processes took the core {preempted} times in {calls['n']} calls: tails are partly theirs")
-    ratio, compiled_in_pair = _ratio(pipeline, capture, whole, spec)
+    ratio, compiled_in_pair = _ratio(pipeline, capture, preloaded, spec)
     compilations = compiled_in_calls + compiled_in_batch + compiled_in_paced + compiled_in_pair
     if compilations:
         notes.append("code was compiled during the timed passes: some times hold that of the compiler")
-    instructions, instructions_note = _instructions(pipeline, capture, whole)
+    instructions, instructions_note = _instructions(pipeline, capture, preloaded)
     null = _pipeline({"schema": 1, "name": "idle", "pipeline": [{"use": registry.default("stage.idle")}]})
-    loops.warm_up(null, capture, whole, spec["warmup_windows"])
-    overhead_us, _, _ = loops.stream_pass(null, capture, whole)
-    growth = memory.growth(pipeline, capture, whole)
+    loops.warm_up(null, capture, preloaded, spec["warmup_windows"])
+    overhead_us, _, _ = loops.stream_pass(null, capture, preloaded)
+    growth = memory.growth(pipeline, capture, preloaded)
     os_threads, threads = _os_threads(), _threads()
     if threads > 1:
         notes.append(f"a numerical library would use {threads} threads")
@@ -120,7 +120,7 @@ def _measured(spec: dict[str, Any], core: int | None) -> dict[str, Any]:
     }
 
 
-def _calls(pipeline: Pipeline, capture: Capture, whole: Frames) -> tuple[dict[str, Any], int]:
+def _calls(pipeline: Pipeline, capture: Capture, preloaded: Frames) -> tuple[dict[str, Any], int]:
     """The stream, one frame a call, and how often something was compiled in it."""
     from uwbbench.measure.latency import latency, loops
     from uwbbench.measure.latency.compilations import undisturbed
@@ -128,22 +128,22 @@ def _calls(pipeline: Pipeline, capture: Capture, whole: Frames) -> tuple[dict[st
 
     def once() -> tuple[FloatArray, BoolArray | None, float, dict[str, int]]:
         before = Usage.now()
-        passed = loops.stream_pass(pipeline, capture, whole)
+        passed = loops.stream_pass(pipeline, capture, preloaded)
         after = Usage.now()
         return *passed, {} if before is None or after is None else after.since(before)
 
     (times_us, clustered, flush_us, usage), compilations = undisturbed(once)
-    found = {
+    figures = {
         **latency.call_summary(times_us, 1e6 / capture.radar.frame_rate_hz),
         **latency.kinds_summary(times_us, clustered),
         "amortised_us": float(times_us.sum() + flush_us) / len(times_us),
         "quality": usage,
         "times_us": times_us.tolist(),
     }
-    return found, compilations
+    return figures, compilations
 
 
-def _paced(pipeline: Pipeline, capture: Capture, whole: Frames, spec: dict[str, Any]) -> tuple[dict[str, Any], int]:
+def _paced(pipeline: Pipeline, capture: Capture, preloaded: Frames, spec: dict[str, Any]) -> tuple[dict[str, Any], int]:
     """Frames at a fixed rate, where that was asked for, and how often something was compiled meanwhile."""
     from uwbbench.measure.latency import paced
     from uwbbench.measure.latency.compilations import undisturbed
@@ -152,14 +152,14 @@ def _paced(pipeline: Pipeline, capture: Capture, whole: Frames, spec: dict[str, 
         return {}, 0
     rate_hz = spec["rate_hz"] or capture.radar.frame_rate_hz
     (times_us, lateness_us), compilations = undisturbed(
-        lambda: paced.paced_pass(pipeline, capture, whole, rate_hz, spec["paced_s"]), tries=1
+        lambda: paced.paced_pass(pipeline, capture, preloaded, rate_hz, spec["paced_s"]), tries=1
     )
     summary = paced.paced_summary(times_us, lateness_us, rate_hz)
     return {"paced": summary, "paced_times_us": times_us.tolist()}, compilations
 
 
 def _ratio(
-    pipeline: Pipeline, capture: Capture, whole: Frames, spec: dict[str, Any]
+    pipeline: Pipeline, capture: Capture, preloaded: Frames, spec: dict[str, Any]
 ) -> tuple[dict[str, Any] | None, int]:
     """Alternating with the reference, where there is one, and how often something was compiled meanwhile."""
     from uwbbench.measure.latency.compilations import undisturbed
@@ -169,10 +169,10 @@ def _ratio(
     if spec["reference"] is None:
         return None, 0
     reference = _pipeline(spec["reference"])
-    players = [Player(one, capture, whole) for one in (pipeline, reference)]
+    players = [Player(timed, capture, preloaded) for timed in (pipeline, reference)]
     players[1].warm_up(spec["warmup_windows"])
-    size = turn_frames([player.call_s() for player in players], len(whole))
-    blocks = max(spec["blocks"], len(whole) // size)  # all frames count in the ratio of all time together
+    size = turn_frames([player.call_s() for player in players], len(preloaded))
+    blocks = max(spec["blocks"], len(preloaded) // size)  # all frames count in the ratio of all time together
     times_s, compilations = undisturbed(lambda: in_turns(players, size, blocks))
     waited_s = np.reshape([player.waited_s for player in players], (-1, blocks, 2))
     disturbed = int(np.count_nonzero(waited_s.any(axis=(0, 2))))
@@ -180,12 +180,12 @@ def _ratio(
     return {"reference": reference.name, **ratio, "disturbed_blocks": disturbed}, compilations
 
 
-def _instructions(pipeline: Pipeline, capture: Capture, whole: Frames) -> tuple[float | None, str]:
+def _instructions(pipeline: Pipeline, capture: Capture, preloaded: Frames) -> tuple[float | None, str]:
     """Instructions a frame, in a pass of its own."""
     from uwbbench.measure.latency import loops
     from uwbbench.measure.latency.counters import counted
 
-    step, calls = pipeline.open(capture).step, loops.cut(whole, 1)
+    step, calls = pipeline.open(capture).step, loops.cut(preloaded, 1)
 
     def work() -> None:
         for frames in calls:
@@ -208,7 +208,7 @@ def _surroundings(core: int | None) -> dict[str, Any]:
     from uwbbench.measure.latency.machine import machine, versions
 
     about = machine()
-    # The process may use one core by now; what is told is the machine.
+    # The process may use one core by now; what is described is the machine.
     del about["usable_cores"]
     return {
         "pinned": core is not None,
@@ -221,16 +221,16 @@ def _threads() -> int:
     """Most threads that any loaded numerical library would use."""
     from threadpoolctl import threadpool_info
 
-    found = [int(pool["num_threads"]) for pool in threadpool_info()]
+    counts = [int(pool["num_threads"]) for pool in threadpool_info()]
     if "numba" in sys.modules:
         import numba
 
-        found.append(int(numba.get_num_threads()))
-    return max(found, default=1)
+        counts.append(int(numba.get_num_threads()))
+    return max(counts, default=1)
 
 
 def _os_threads() -> int | None:
-    """Threads that this process really has; None where the system does not tell."""
+    """Threads that this process really has; None where the system does not list them."""
     tasks = Path("/proc/self/task")
     return len(list(tasks.iterdir())) if tasks.is_dir() else None
 

@@ -17,7 +17,7 @@ def crest_at_the_first_and_last_tap(subject: Subject) -> Evidence:
     What lies on the edge of the frame has one neighbour only. Such a sample may hide the echo: it sets the scale, or
     counts as the noise.
     """
-    found = []
+    shares = []
     for tap in (0, NOISE_TAPS, TAPS - 1):
 
         def raised(samples: np.ndarray, tap: int = tap) -> np.ndarray:
@@ -25,8 +25,8 @@ def crest_at_the_first_and_last_tap(subject: Subject) -> Evidence:
             return samples
 
         capture = altered(subject.capture, raised)
-        found.append(f"{hit_share(subject.run_altered(capture), capture):.0%}")
-    return Evidence(f"first, first searched and last tap: echo found in {', '.join(found)} of frames")
+        shares.append(f"{hit_share(subject.run_altered(capture), capture):.0%}")
+    return Evidence(f"first, first searched and last tap: echo found in {', '.join(shares)} of frames")
 
 
 @hard_case("survive")
@@ -41,19 +41,19 @@ def two_echoes(subject: Subject) -> Evidence:
     rounding is at work. Such detectors are asked only for separations within their guard cells.
     """
     within = min(stage.resolves_taps for _, stage in subject.stages())
-    told = []
+    observed = []
     usual = hit_share(subject.usual, subject.capture)
     for separation_ns in (1.0, 2.0, 3.0):
         late = separation_ns * 1e-9 / subject.radar.sample_interval_s
         if late > within:
-            told.append(f"{separation_ns:g} ns: not asked of averaged training cells")
+            observed.append(f"{separation_ns:g} ns: not asked of averaged training cells")
             continue
         capture = approach(echoes=((0.0, ECHO), (late, 1j * ECHO)))
-        found = subject.run_altered(capture)
+        detections = subject.run_altered(capture)
         assert capture.truth is not None  # noqa: S101  (the suite's captures have a truth)
-        true_m = capture.truth.seen_from(capture.radar, capture.trajectory).range_m[found.frame, 0]
+        true_m = capture.truth.seen_from(capture.radar, capture.trajectory).range_m[detections.frame, 0]
         span_m = 0.15 * separation_ns
-        offset_m = found.range_m - true_m
-        clipped = found.with_columns(range_m=found.range_m - np.clip(offset_m, 0.0, span_m))
-        told.append(f"{separation_ns:g} ns: {still_found(clipped, capture, usual, 0.10)}")
-    return Evidence("; ".join(told))
+        offset_m = detections.range_m - true_m
+        clipped = detections.with_columns(range_m=detections.range_m - np.clip(offset_m, 0.0, span_m))
+        observed.append(f"{separation_ns:g} ns: {still_found(clipped, capture, usual, 0.10)}")
+    return Evidence("; ".join(observed))

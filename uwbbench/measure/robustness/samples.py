@@ -34,18 +34,18 @@ def _damaged(capture: Capture, value: complex) -> Capture:
     return altered(capture, damage)
 
 
-def _nothing_there(found: Detections) -> None:
-    if np.isin(found.frame, DAMAGED).any():
-        raise Violation(f"{np.isin(found.frame, DAMAGED).sum()} detections in frames that hold no echo")
+def _nothing_there(detections: Detections) -> None:
+    if np.isin(detections.frame, DAMAGED).any():
+        raise Violation(f"{np.isin(detections.frame, DAMAGED).sum()} detections in frames that hold no echo")
 
 
-def _nothing_but(subject: Subject, found: Detections) -> Evidence:
+def _nothing_but(subject: Subject, detections: Detections) -> Evidence:
     """The damaged frames yield nothing, and the intact ones what they yield on their own."""
-    _nothing_there(found)
+    _nothing_there(detections)
     for name, stage in subject.stages():
         if stage.every_nth:
             raise NotApplicable(f"{name} works on every n-th frame of the capture, which are others without these")
-    return unchanged(in_frames(found, INTACT), subject.run(chosen(subject.capture, INTACT)), EXACT_M)
+    return unchanged(in_frames(detections, INTACT), subject.run(chosen(subject.capture, INTACT)), EXACT_M)
 
 
 @hard_case("reject")
@@ -71,9 +71,9 @@ def constant_frames(subject: Subject) -> Evidence:
     Min-max scaling of a constant is 0/0, and its direct path stands 0 dB above its noise. Unlike a frame of zeros it
     may count as a measurement: a running median of the noise takes it in, and a decision near a limit then changes.
     """
-    found = subject.run_altered(_damaged(subject.capture, 0.3 - 0.2j))
-    _nothing_there(found)
-    return _hardly_flipped(in_frames(found, INTACT), subject.run(chosen(subject.capture, INTACT)), 0.05)
+    detections = subject.run_altered(_damaged(subject.capture, 0.3 - 0.2j))
+    _nothing_there(detections)
+    return _hardly_flipped(in_frames(detections, INTACT), subject.run(chosen(subject.capture, INTACT)), 0.05)
 
 
 @hard_case("reject")
@@ -83,9 +83,9 @@ def constant_capture(subject: Subject) -> Evidence:
 
 
 def _nothing(subject: Subject, value: complex) -> Evidence:
-    found = subject.run_altered(altered(subject.capture, lambda samples: np.full_like(samples, value)))
-    if len(found):
-        raise Violation(f"{len(found)} detections where nothing is")
+    detections = subject.run_altered(altered(subject.capture, lambda samples: np.full_like(samples, value)))
+    if len(detections):
+        raise Violation(f"{len(detections)} detections where nothing is")
     return Evidence("no detections")
 
 
@@ -101,9 +101,9 @@ def rippled_constant_frames(subject: Subject) -> Evidence:
         samples[:, 9::5] = np.nextafter(0.3, 1)
         return samples
 
-    found = subject.run_altered(altered(subject.capture, rippled))
-    if len(found):
-        raise Violation(f"{len(found)} detections of rounding errors")
+    detections = subject.run_altered(altered(subject.capture, rippled))
+    if len(detections):
+        raise Violation(f"{len(detections)} detections of rounding errors")
     return Evidence("no detections")
 
 
@@ -120,16 +120,16 @@ def zero_noise_taps(subject: Subject) -> Evidence:
         return samples
 
     capture = altered(subject.capture, silenced)
-    found = subject.run_altered(capture)
-    return Evidence(f"{len(found)} detections, echo found in {hit_share(found, capture):.0%} of frames")
+    detections = subject.run_altered(capture)
+    return Evidence(f"{len(detections)} detections, echo found in {hit_share(detections, capture):.0%} of frames")
 
 
 @hard_case("survive")
 def dc_offset(subject: Subject) -> Evidence:
     """With an offset of half the noise on every sample the echo is found as often, within a tenth of the frames."""
     capture = altered(subject.capture, lambda samples: samples + NOISE / 2 * (1 + 1j) / np.sqrt(2))
-    found = subject.run_altered(capture)
-    return Evidence(still_found(found, capture, hit_share(subject.usual, subject.capture), 0.10))
+    detections = subject.run_altered(capture)
+    return Evidence(still_found(detections, capture, hit_share(subject.usual, subject.capture), 0.10))
 
 
 def _clipped(samples: ComplexArray, limit: float) -> ComplexArray:
@@ -143,8 +143,8 @@ def clipped_samples(subject: Subject) -> Evidence:
     The limit of 0.9 cuts the crests of the frames whose phase puts them on one axis, and makes plateaus of them.
     """
     capture = altered(subject.capture, lambda samples: _clipped(samples, 0.9))
-    found = subject.run_altered(capture)
-    return Evidence(still_found(found, capture, hit_share(subject.usual, subject.capture), 0.10))
+    detections = subject.run_altered(capture)
+    return Evidence(still_found(detections, capture, hit_share(subject.usual, subject.capture), 0.10))
 
 
 @hard_case("survive")
@@ -155,8 +155,8 @@ def hard_clipped_samples(subject: Subject) -> Evidence:
     asked for.
     """
     capture = altered(subject.capture, lambda samples: _clipped(samples, 0.3))
-    found = subject.run_altered(capture)
-    return Evidence(f"{len(found)} detections, echo found in {hit_share(found, capture):.0%} of frames")
+    detections = subject.run_altered(capture)
+    return Evidence(f"{len(detections)} detections, echo found in {hit_share(detections, capture):.0%} of frames")
 
 
 @hard_case("reject")
@@ -186,9 +186,9 @@ def nan_frames(subject: Subject) -> Evidence:
 @hard_case("reject")
 def nan_capture(subject: Subject) -> Evidence:
     """A capture without one valid frame yields nothing, and processes nothing."""
-    found = subject.run(altered(subject.capture, lambda samples: np.full_like(samples, np.nan)))
-    if len(found) or len(found.processed):
-        raise Violation(f"{len(found)} detections, {len(found.processed)} frames processed")
+    detections = subject.run(altered(subject.capture, lambda samples: np.full_like(samples, np.nan)))
+    if len(detections) or len(detections.processed):
+        raise Violation(f"{len(detections)} detections, {len(detections.processed)} frames processed")
     return Evidence("no detections, no frames processed")
 
 
@@ -198,8 +198,8 @@ def denormal_capture(subject: Subject) -> Evidence:
 
     Samples hold a few digits there, so that nothing is asked of what is found.
     """
-    found = subject.run_altered(altered(subject.capture, lambda samples: samples * 1e-310))
-    return Evidence(f"{len(found)} detections")
+    detections = subject.run_altered(altered(subject.capture, lambda samples: samples * 1e-310))
+    return Evidence(f"{len(detections)} detections")
 
 
 @hard_case("survive")
@@ -210,8 +210,8 @@ def denormal_noise(subject: Subject) -> Evidence:
         samples[:, :NOISE_TAPS] = 5e-324
         return samples
 
-    found = subject.run_altered(altered(subject.capture, quieted))
-    return Evidence(f"{len(found)} detections")
+    detections = subject.run_altered(altered(subject.capture, quieted))
+    return Evidence(f"{len(detections)} detections")
 
 
 @hard_case("equal")
@@ -228,8 +228,8 @@ def denormals_kept(subject: Subject) -> Evidence:
 
 
 def _scaled(subject: Subject, factor: float) -> Evidence:
-    found = subject.run_altered(altered(subject.capture, lambda samples: samples * factor))
-    return unchanged(found, subject.usual, EXACT_M)
+    detections = subject.run_altered(altered(subject.capture, lambda samples: samples * factor))
+    return unchanged(detections, subject.usual, EXACT_M)
 
 
 @hard_case("equal")
@@ -244,12 +244,12 @@ def amplitudes_times_1e150(subject: Subject) -> Evidence:
     return _scaled(subject, 1e150)
 
 
-def _hardly_flipped(found: Detections, expected: Detections, limit: float) -> Evidence:
-    share = flipped_share(found, expected)
-    told = f"{share:.2%} of the detections come or go"
+def _hardly_flipped(detections: Detections, expected: Detections, limit: float) -> Evidence:
+    share = flipped_share(detections, expected)
+    observed = f"{share:.2%} of the detections come or go"
     if share > limit:
-        raise Violation(told, flips=share)
-    return Evidence(told, flips=share)
+        raise Violation(observed, flips=share)
+    return Evidence(observed, flips=share)
 
 
 @hard_case("equal")
@@ -299,13 +299,13 @@ def magnitudes_of_integers(subject: Subject) -> Evidence:  # noqa: ARG001  (all 
     """
     real, imaginary = np.meshgrid(np.arange(1, 160), np.arange(1, 160))
     pairs = (real + 1j * imaginary).astype(np.complex64).ravel()
-    found = magnitude(pairs)
+    magnitudes = magnitude(pairs)
     power = (real * real + imaginary * imaginary).ravel()
     order = np.argsort(power, kind="stable")
     equal = np.diff(power[order]) == 0
-    if np.any(np.diff(found[order])[equal] != 0):
+    if np.any(np.diff(magnitudes[order])[equal] != 0):
         raise Violation("pairs of equal power have unequal magnitudes")
-    squared = exact_ulps(found[:500], [_root(int(value)) for value in power[:500]])
+    squared = exact_ulps(magnitudes[:500], [_root(int(value)) for value in power[:500]])
     if squared > 0.5:
         raise Violation(f"magnitudes are {squared:.2g} units off")
     return Evidence(f"{int(equal.sum())} pairs of equal power; magnitudes within {squared:.2g} units")
@@ -325,5 +325,5 @@ def direct_path_thousandfold(subject: Subject) -> Evidence:
     path better than noise lets it be known.
     """
     capture = approach(direct=1000.0)
-    found = subject.run_altered(capture)
-    return Evidence(f"{len(found)} detections, echo found in {hit_share(found, capture):.0%} of frames")
+    detections = subject.run_altered(capture)
+    return Evidence(f"{len(detections)} detections, echo found in {hit_share(detections, capture):.0%} of frames")

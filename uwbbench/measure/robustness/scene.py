@@ -103,7 +103,21 @@ def altered(capture: Capture, change: Callable[[ComplexArray], Any]) -> Capture:
 
 
 def chosen(capture: Capture, rows: IntArray, timestamp_s: FloatArray | None = None) -> Capture:
-    """Capture made of some frames of another, in the order of ``rows``, at their own times unless others are given."""
+    """Capture made of some frames of another, in the order of ``rows``, at their own times unless others are given.
+
+    Parameters
+    ----------
+    capture : Capture
+    rows : (n,) int array
+        Indices of its frames; they may repeat.
+    timestamp_s : (n,) array, optional
+        Times of the chosen frames.
+
+    Raises
+    ------
+    CaptureError
+        If the times decrease.
+    """
     track = capture.trajectory
     times = track.timestamp_s[rows] if timestamp_s is None else timestamp_s
     names = ("preamble", "sts1", "sts2", "first_path_index", "first_path_index_sts1", "first_path_index_sts2")

@@ -70,9 +70,9 @@ def one_frame_capture(subject: Subject) -> Evidence:
 @hard_case("survive")
 def no_frames(subject: Subject) -> Evidence:
     """A capture without frames yields nothing."""
-    found = subject.run(chosen(subject.capture, np.empty(0, np.int64)))
-    if len(found) or len(found.processed):
-        raise Violation(f"{len(found)} detections in no frames")
+    detections = subject.run(chosen(subject.capture, np.empty(0, np.int64)))
+    if len(detections) or len(detections.processed):
+        raise Violation(f"{len(detections)} detections in no frames")
     return Evidence("no detections")
 
 
@@ -96,8 +96,8 @@ def clutter_step(subject: Subject) -> Evidence:
 
     stepped, steady = approach(standing=risen), approach(standing=lasting)
     usual = hit_share(subject.run_altered(steady), steady, SETTLED)
-    found = subject.run(stepped)
-    return Evidence(still_found(found, stepped, usual, LOSS, SETTLED))
+    detections = subject.run(stepped)
+    return Evidence(still_found(detections, stepped, usual, LOSS, SETTLED))
 
 
 @hard_case("survive")
@@ -117,8 +117,8 @@ def interference_bursts(subject: Subject) -> Evidence:
         samples[20:50:7, 33] += burst
         return samples
 
-    found = subject.run_altered(altered(subject.capture, flooded))
-    share = flipped_share(in_frames(found, SETTLED), in_frames(subject.usual, SETTLED))
+    detections = subject.run_altered(altered(subject.capture, flooded))
+    share = flipped_share(in_frames(detections, SETTLED), in_frames(subject.usual, SETTLED))
     if share > LOSS:
         raise Violation(f"{share:.0%} of the detections 80 frames later come or go")
     return Evidence(f"{share:.0%} of the detections 80 frames later come or go")

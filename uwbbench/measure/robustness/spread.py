@@ -22,7 +22,7 @@ def standard_deviation_far_from_zero(subject: Subject) -> Evidence:  # noqa: ARG
     exact = [Fraction(value) for value in errors_m.tolist()]
     mean = sum(exact) / len(exact)
     expected = math.sqrt(sum((value - mean) ** 2 for value in exact) / len(exact))
-    found = StandardDeviation.value(errors_m)
-    if not abs(found - expected) <= 1e-7 * expected:
-        raise Violation(f"standard deviation {found}, exactly {expected}")
-    return Evidence(f"{found:.6f} m, {abs(found - expected):.1g} m off")
+    computed = StandardDeviation.value(errors_m)
+    if not abs(computed - expected) <= 1e-7 * expected:
+        raise Violation(f"standard deviation {computed}, exactly {expected}")
+    return Evidence(f"{computed:.6f} m, {abs(computed - expected):.1g} m off")

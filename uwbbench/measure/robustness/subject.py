@@ -55,15 +55,15 @@ class Subject(StagesOnTrial):
         """
         with warnings.catch_warnings():
             warnings.simplefilter("error")
-            found = self.pipeline.run(capture)
-        if not np.isin(found.frame, found.processed).all():
+            detections = self.pipeline.run(capture)
+        if not np.isin(detections.frame, detections.processed).all():
             raise Violation("detections belong to frames that are invalid, or not of this capture")
-        for name, values in found.columns.items():
+        for name, values in detections.columns.items():
             if np.isinf(values).any():
                 raise Violation(f"{np.isinf(values).sum()} of {len(values)} detections have an infinite {name}")
-        if "amplitude" in found and np.isnan(found["amplitude"]).any():
+        if "amplitude" in detections and np.isnan(detections["amplitude"]).any():
             raise Violation("detections have an amplitude that is no number")
-        return found
+        return detections
 
     def run_altered(self, capture: Capture) -> Detections:
         """Detections of a detector that looks at samples.

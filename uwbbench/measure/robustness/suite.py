@@ -1,4 +1,4 @@
-"""All hard cases put to one detector."""
+"""All hard cases, and what one detector makes of them."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ class Stability(Examination):
         return max((result.error_ulp for result in self.results if result.error_ulp is not None), default=None)
 
     def flips(self, case: HardCase) -> float | None:
-        """Share of the detections that come or go in one case; None if it was not put to the detector."""
+        """Share of the detections that come or go in one case; None if the case was not tried."""
         return next((result.flips for result in self.results if result.check.name == case.name), None)
 
     def summary(self) -> dict[str, Any]:
@@ -101,7 +101,7 @@ def case_named(name: str) -> HardCase:
 
 
 def examine(pipeline: Pipeline, cases: Sequence[HardCase] | None = None) -> Stability:
-    """Put hard cases to a detector.
+    """Examine a detector with hard cases.
 
     Parameters
     ----------
@@ -120,5 +120,5 @@ def examine(pipeline: Pipeline, cases: Sequence[HardCase] | None = None) -> Stab
     return Stability(
         detector=pipeline.name,
         usual_hits=hit_share(subject.usual, subject.capture),
-        results=tuple(one.judge(subject) for one in chosen),
+        results=tuple(case.judge(subject) for case in chosen),
     )

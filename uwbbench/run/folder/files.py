@@ -77,7 +77,21 @@ def read_json(path: Path) -> Any:
 
 
 def write_parquet(path: Path, table: pa.Table, facts: Any) -> None:
-    """Write a table, with plain values about it in the file's own metadata."""
+    """Write a table, with plain values about it in the file's own metadata.
+
+    Parameters
+    ----------
+    path : Path
+        Replaced once the file is complete.
+    table : pyarrow.Table
+    facts : object
+        What :func:`~uwbbench.run.folder.identity.plain` can turn into JSON.
+
+    Raises
+    ------
+    StoreError
+        If it cannot be written.
+    """
     import pyarrow.parquet as pq
 
     noted = table.replace_schema_metadata({**(table.schema.metadata or {}), _FACTS: json.dumps(plain(facts)).encode()})

@@ -116,9 +116,9 @@ class RunFolder:
         """Files that hold results, by their path in the folder; reports are made of these."""
         folders = ("captures", "detections", "candidates", "times")
         with disk_errors(self.path, "read"):
-            found = [path for name in folders for path in (self.path / name).glob("*") if path.is_file()]
-            found += [path for name in ("journal.jsonl", "scores.parquet") if (path := self.path / name).is_file()]
-        return sorted(path.relative_to(self.path).as_posix() for path in found)
+            files = [path for name in folders for path in (self.path / name).glob("*") if path.is_file()]
+            files += [path for name in ("journal.jsonl", "scores.parquet") if (path := self.path / name).is_file()]
+        return sorted(path.relative_to(self.path).as_posix() for path in files)
 
     def hash_of(self, name: str) -> str:
         """SHA-256 of a file in the folder."""
@@ -140,9 +140,18 @@ class RunFolder:
         """What could not be read of the journal."""
         return journal.read(self.path / "journal.jsonl")[1]
 
-    def write_detections(self, unit: str, found: Detections, candidates: Detections | None) -> None:
-        """Store what a detector found, and the peaks before its filters where they are known."""
-        tables.write_detections(self._file("detections", unit), found)
+    def write_detections(self, unit: str, detections: Detections, candidates: Detections | None) -> None:
+        """Store what a detector found, and the peaks before its filters where they are known.
+
+        Parameters
+        ----------
+        unit : str
+            Identifier of the unit.
+        detections : Detections
+        candidates : Detections or None
+            The peaks before the filters; None where nobody asked for them.
+        """
+        tables.write_detections(self._file("detections", unit), detections)
         if candidates is not None:
             tables.write_detections(self._file("candidates", unit), candidates)
 
@@ -154,7 +163,16 @@ class RunFolder:
     # Captures --------------------------------------------------------------------------------------------------
 
     def write_header(self, capture_id: str, header: CaptureHeader, sha256: str) -> None:
-        """Store all of a capture but its samples, unless the same content is there already."""
+        """Store all of a capture but its samples, unless the same content is there already.
+
+        Parameters
+        ----------
+        capture_id : str
+            Identifier of the capture in this folder.
+        header : CaptureHeader
+        sha256 : str
+            Of the content, samples included.
+        """
         stem = self.path / "captures" / _safe(capture_id)
         if not stem.with_suffix(".json").is_file() or self.content(capture_id) != sha256:
             tables.write_header(stem, header, sha256)
@@ -170,7 +188,16 @@ class RunFolder:
     # Times -----------------------------------------------------------------------------------------------------
 
     def write_times(self, unit: str, times_us: FloatArray, latency: Mapping[str, Any]) -> None:
-        """Store the time of every call of a latency pass, and its summary."""
+        """Store the time of every call of a latency pass, and its summary.
+
+        Parameters
+        ----------
+        unit : str
+            Identifier of the unit.
+        times_us : (calls,) array
+        latency : mapping
+            Summary as plain values.
+        """
         import pyarrow as pa
 
         write_parquet(self._file("times", unit), pa.table({"time_us": times_us}), latency)

@@ -86,7 +86,7 @@ def read(path: Path) -> tuple[dict[str, Entry], list[str]]:
 
     A run that was killed while it wrote leaves a torn line; its unit counts as not done.
     """
-    found: dict[str, Entry] = {}
+    last: dict[str, Entry] = {}
     notes = []
     with disk_errors(path, "read"):
         lines = path.read_bytes().split(b"\n") if path.exists() else []
@@ -95,7 +95,7 @@ def read(path: Path) -> tuple[dict[str, Entry], list[str]]:
             continue
         try:
             entry = Entry.from_dict(json.loads(line))
-            found[entry.unit] = entry
+            last[entry.unit] = entry
         except (ValueError, TypeError, AttributeError, RecursionError):
             notes.append(f"{path.name} line {number} is torn or damaged and was ignored")
-    return found, notes
+    return last, notes

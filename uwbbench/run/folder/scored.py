@@ -27,13 +27,27 @@ def rules_of(experiment: Mapping[str, Any]) -> tuple[ScoringRules, ...]:
     )
 
 
-def score_rows(found: Detections, header: CaptureHeader, rules: Iterable[ScoringRules]) -> list[dict[str, Any]]:
-    """One row for each scoring and table; a scoring that is impossible here is a row with the reason."""
+def score_rows(detections: Detections, header: CaptureHeader, rules: Iterable[ScoringRules]) -> list[dict[str, Any]]:
+    """One row for each scoring and table; a scoring that is impossible here is a row with the reason.
+
+    Parameters
+    ----------
+    detections : Detections
+    header : CaptureHeader
+        Of the capture that they are of.
+    rules : iterable of ScoringRules
+
+    Returns
+    -------
+    list of dict
+        With ``scoring``, ``table``, ``status`` and ``reason``; where scored, the figures of a
+        :class:`~uwbbench.measure.accuracy.scoring.ScoreBlock` too.
+    """
     rows: list[dict[str, Any]] = []
     for rule in rules:
         about = {"scoring": rule.scoring, "table": "filtering"}
         try:
-            scores = score(found, header, rule.scoring, rule.gate_m, rule.region, rule.strongest)
+            scores = score(detections, header, rule.scoring, rule.gate_m, rule.region, rule.strongest)
         except ScoringError as error:
             rows.append({**about, "status": "unscored", "reason": str(error)})
             continue
@@ -70,20 +84,20 @@ def with_metrics(
     """
     metrics = MetricChoice(listed)
     columns = {name: column_of(name, metrics[name].unit) for name in listed if name not in metrics.absent}
-    made = {unit: list(rows) for unit, rows in rows_of.items()}
+    completed = {unit: list(rows) for unit, rows in rows_of.items()}
     for entry in folder.entries() if columns else ():
-        rows = made.get(entry.unit, []) if entry.kind == "accuracy" else []
+        rows = completed.get(entry.unit, []) if entry.kind == "accuracy" else []
         scored = {row["scoring"] for row in rows if row["status"] == "scored"}
         if not scored:
             continue
-        found, header = folder.detections(entry.unit), folder.header(entry.capture_id)
-        tables = {rule.scoring: outcomes(found, header, rule) for rule in rules if rule.scoring in scored}
+        detections, header = folder.detections(entry.unit), folder.header(entry.capture_id)
+        tables = {rule.scoring: outcomes(detections, header, rule) for rule in rules if rule.scoring in scored}
         for place, row in enumerate(rows):
             if row["status"] == "scored":
                 outcome = tables[row["scoring"]][row["table"]]
                 values = {column: _value(name, metrics[name], outcome) for name, column in columns.items()}
                 rows[place] = values | row  # what is stored for every run anyway stays
-    return made
+    return completed
 
 
 def _value(name: str, metric: type[Metric], outcome: Outcome) -> float | None:

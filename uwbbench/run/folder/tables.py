@@ -36,12 +36,16 @@ def from_spans(spans: Iterable[Sequence[int]]) -> IntArray:
     return np.concatenate(runs) if runs else np.empty(0, np.int64)
 
 
-def write_detections(path: Path, found: Detections) -> None:
+def write_detections(path: Path, detections: Detections) -> None:
     """Store detections with the frames that were processed, the notes and the chain."""
     import pyarrow as pa
 
-    facts = {"processed": as_spans(found.processed), "notes": found.notes, "chain": list(found.chain.items())}
-    write_parquet(path, pa.table(dict(found.columns)), facts)
+    facts = {
+        "processed": as_spans(detections.processed),
+        "notes": detections.notes,
+        "chain": list(detections.chain.items()),
+    }
+    write_parquet(path, pa.table(dict(detections.columns)), facts)
 
 
 def read_detections(path: Path, candidates: Path | None = None) -> Detections:
@@ -58,21 +62,30 @@ def read_detections(path: Path, candidates: Path | None = None) -> Detections:
 
 
 def write_header(stem: Path, header: CaptureHeader, sha256: str) -> None:
-    """Store all of a capture but its samples as ``stem.json`` and, per frame, ``stem.parquet``."""
+    """Store all of a capture but its samples as ``stem.json`` and, per frame, ``stem.parquet``.
+
+    Parameters
+    ----------
+    stem : Path
+        Of both files, without a suffix.
+    header : CaptureHeader
+    sha256 : str
+        Of the capture's content, samples included.
+    """
     import pyarrow as pa
 
     track = header.trajectory
     columns: dict[str, Any] = {"timestamp_s": track.timestamp_s, "yaw_rad": track.yaw_rad}
     columns |= {f"{axis}_m": track.position_m[:, index] for index, axis in enumerate("xyz")}
     objects = []
-    for index, thing in enumerate(header.truth.objects if header.truth else ()):
-        label: dict[str, Any] = {"name": thing.name, "material": thing.material, "structure": thing.structure}
-        if thing.moves:
-            label["moves"] = list(thing.outline_m.shape[1:])
-            flat = np.ascontiguousarray(thing.outline_m, np.float64).reshape(len(track), -1)
+    for index, item in enumerate(header.truth.objects if header.truth else ()):
+        label: dict[str, Any] = {"name": item.name, "material": item.material, "structure": item.structure}
+        if item.moves:
+            label["moves"] = list(item.outline_m.shape[1:])
+            flat = np.ascontiguousarray(item.outline_m, np.float64).reshape(len(track), -1)
             columns |= {f"outline_{index}_{place}": flat[:, place] for place in range(flat.shape[1])}
         else:
-            label["outline_m"] = thing.outline_m
+            label["outline_m"] = item.outline_m
         objects.append(label)
     about = {name: getattr(header, name) for name in ("name", "source", "license", "citation", "description")}
     truth = None if header.truth is None else {"exhaustive": header.truth.exhaustive, "objects": objects}

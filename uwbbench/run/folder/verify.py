@@ -7,7 +7,7 @@ Conventions
   scores from the stored detections, and percentiles from the stored times. No detector is run.
 * What cannot be computed again is taken as it is: the detections themselves, the truth, time ratios (their blocks are
   not kept), peak memory, the hard cases, and the machine.
-* A hash tells damage and careless editing. Who forges detections and all that follows from them is not found out.
+* A hash reveals damage and careless editing. Who forges detections and all that follows from them is not found out.
 """
 
 from __future__ import annotations
@@ -162,7 +162,7 @@ class _Verifier:
         for capture_id, sha256 in self.manifest["data"].items():
             with self._checking(f"captures/{_shown(capture_id)}.json"):
                 if self.folder.content(capture_id) != sha256:
-                    self._problem(f"captures/{capture_id}.json", "tells another content than the manifest")
+                    self._problem(f"captures/{capture_id}.json", "states another content than the manifest")
             self._count("captures")
 
     # Journal ---------------------------------------------------------------------------------------------------
@@ -212,19 +212,19 @@ class _Verifier:
         sha256 = self._content(entry)
         rules = rules_of(self.manifest["experiment"])
         self._identity(entry, [accuracy_identity(self.manifest["detectors"][entry.detector], sha256, rules)])
-        found, header = self.folder.detections(entry.unit), self.folder.header(entry.capture_id)
-        counts = {"frames": len(header), "processed": len(found.processed), "detections": len(found)}
+        detections, header = self.folder.detections(entry.unit), self.folder.header(entry.capture_id)
+        counts = {"frames": len(header), "processed": len(detections.processed), "detections": len(detections)}
         for name, count in counts.items():
             if entry.facts[name] != count:
                 self._problem(
-                    f"journal.jsonl, {_about(entry)}", f"tells {entry.facts[name]} {name}, stored are {count}"
+                    f"journal.jsonl, {_about(entry)}", f"states {entry.facts[name]} {name}, stored are {count}"
                 )
         if entry.facts["source"] != header.source:
             self._problem(f"journal.jsonl, {_about(entry)}", f"its capture is {header.source}")
-        again = score_rows(found, header, rules)
+        again = score_rows(detections, header, rules)
         self._same(f"journal.jsonl, {_about(entry)}", entry.scores, again)
         stored = self.folder.rules
-        self.sound[entry.unit] = again if stored == list(rules) else score_rows(found, header, stored)
+        self.sound[entry.unit] = again if stored == list(rules) else score_rows(detections, header, stored)
         self._count("units scored again")
 
     def _latency(self, entry: Entry) -> None:
@@ -277,8 +277,8 @@ class _Verifier:
             if done - set(self.sound):
                 return  # said already: what they would be compared with cannot be made
             table = self.folder.scores()
-            whole = with_metrics(self.folder, self.sound, self.folder.rules, self._stored_metrics(table))
-            expected = {_key(row): row for row in table_of(self.entries, whole)}
+            scored = with_metrics(self.folder, self.sound, self.folder.rules, self._stored_metrics(table))
+            expected = {_key(row): row for row in table_of(self.entries, scored)}
             rows: list[dict[str, Any]] = table.to_dict("records")  # type: ignore[assignment]
             stored = {_key(row): row for row in rows}
             for key in sorted({*expected, *stored}):
@@ -308,11 +308,13 @@ class _Verifier:
         for row, expected in zip(stored, again, strict=True):
             other = [name for name, value in expected.items() if not _equal(row.get(name), value)]
             if other:
-                told = ", ".join(f"{name} {_shown(row.get(name))}, not {_shown(expected[name])}" for name in other[:3])
+                differences = ", ".join(
+                    f"{name} {_shown(row.get(name))}, not {_shown(expected[name])}" for name in other[:3]
+                )
                 more = f" and {len(other) - 3} more" if len(other) > 3 else ""
                 of = " ".join(str(expected[key]) for key in ("scoring", "table") if expected.get(key))
-                made = "edited, or made by another version; 'uwbbench rescore' makes scores again"
-                self._problem(where, f"{of + ': ' if of else ''}{told}{more}: {made}")
+                cause = "edited, or made by another version; 'uwbbench rescore' makes scores again"
+                self._problem(where, f"{of + ': ' if of else ''}{differences}{more}: {cause}")
 
 
 def _key(row: Mapping[str, Any]) -> tuple[str, ...]:

@@ -1,4 +1,4 @@
-"""Which metrics a run shows, in which order, and which of them ranks: all told by the metrics themselves.
+"""Which metrics a run shows, in which order, and which of them ranks: all stated by the metrics themselves.
 
 Conventions
 -----------
