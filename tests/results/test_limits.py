@@ -13,7 +13,7 @@ from uwbbench.results.limits import cramer_rao_range_m, rms_bandwidth_hz
 from uwbbench.run import run_experiment
 from uwbbench.run.experiment import read_experiment
 from uwbbench.run.folder.identity import plain
-from uwbbench.show.text import markdown, sheets
+from uwbbench.show.text.report import markdown, sheets
 
 EXPERIMENT = f"""
 schema: 1

@@ -6,7 +6,7 @@ from tests.fixtures.chance import reseeded
 from uwbbench.results import Report, published
 from uwbbench.run import run_experiment
 from uwbbench.run.experiment import read_experiment
-from uwbbench.show.text import sheets
+from uwbbench.show.text.report import sheets
 from uwbbench.show.text.sheet import Sheet
 
 DATASETS = "".join(

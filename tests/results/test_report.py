@@ -17,7 +17,7 @@ from uwbbench.run import rescore, run_experiment
 from uwbbench.run.experiment import read_experiment
 from uwbbench.run.folder import RunFolder
 from uwbbench.run.folder.identity import plain
-from uwbbench.show.text import markdown, sheets, write_report
+from uwbbench.show.text.report import markdown, sheets, write_report
 
 Run = Callable[..., RunFolder]
 APPROACH = "{use: approach, params: {speed_m_s: 3.0}}"

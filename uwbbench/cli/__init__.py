@@ -30,8 +30,7 @@ from uwbbench.cli import (
     tune,
     warmup,
 )
-
-USAGE_ERROR, INTERRUPTED = 2, 130
+from uwbbench.cli.exit_codes import INTERRUPTED, USAGE_ERROR
 
 
 class _Commands(TyperGroup):

@@ -11,8 +11,7 @@ import typer
 import uwbbench
 from uwbbench.api.errors import UwbbenchError
 from uwbbench.cli import options, render
-
-USAGE_ERROR = 2
+from uwbbench.cli.exit_codes import USAGE_ERROR
 
 
 class ListedKind(StrEnum):

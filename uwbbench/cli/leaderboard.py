@@ -9,8 +9,7 @@ from typing import Annotated
 import typer
 
 from uwbbench.cli import options, render
-
-CHECK_FAILED = 1
+from uwbbench.cli.exit_codes import CHECK_FAILED
 
 RunPaths = Annotated[list[Path], typer.Argument(metavar="RUN...", help="Run folders.", show_default=False)]
 

@@ -12,14 +12,13 @@ import typer
 
 from uwbbench.api.errors import ConfigError
 from uwbbench.cli import options, render
+from uwbbench.cli.exit_codes import INTERRUPTED, UNITS_FAILED
 from uwbbench.show import written
 from uwbbench.show.written import Format
 
 if TYPE_CHECKING:
     from uwbbench.run import Progress
     from uwbbench.run.folder import RunFolder
-
-UNITS_FAILED, INTERRUPTED = 3, 130
 
 RunPath = Annotated[Path, typer.Argument(metavar="RUN", help="Run folder.", show_default=False)]
 

@@ -11,14 +11,13 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from uwbbench.cli import options, render
+from uwbbench.cli.exit_codes import CHECK_FAILED
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from uwbbench.api.registry import AuthoredKind
     from uwbbench.tools.check import Conformance
-
-CHECK_FAILED = 1
 
 
 class KindOption(StrEnum):

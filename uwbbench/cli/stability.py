@@ -7,11 +7,10 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from uwbbench.cli import options, render
+from uwbbench.cli.exit_codes import CHECK_FAILED
 
 if TYPE_CHECKING:
     from uwbbench.measure.robustness import Stability
-
-CHECK_FAILED = 1
 
 
 def stability(

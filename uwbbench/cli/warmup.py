@@ -8,11 +8,10 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from uwbbench.cli import options, render
+from uwbbench.cli.exit_codes import UNITS_FAILED
 
 if TYPE_CHECKING:
     from uwbbench.tools.warmup import Warmed
-
-UNITS_FAILED = 3
 
 
 def warmup(

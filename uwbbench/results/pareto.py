@@ -14,7 +14,8 @@ Conventions
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections import defaultdict
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -109,6 +110,16 @@ def speed_of(timed: Sequence[Entry]) -> Speed | None:
         deadline=float(np.median(deadlines)),
         p50_us=float(np.median([facts["p50_us"] for facts in compared])),
     )
+
+
+def speeds_of_run(entries: Iterable[Entry]) -> dict[tuple[str, str], Speed]:
+    """Speed by dataset and detector, from all entries of a run; without those that were never compared."""
+    timed: dict[tuple[str, str], list[Entry]] = defaultdict(list)
+    for entry in entries:
+        if (entry.kind, entry.status) == ("latency", "done"):
+            timed[entry.dataset, entry.detector].append(entry)
+    speeds = {key: speed_of(units) for key, units in timed.items()}
+    return {key: speed for key, speed in speeds.items() if speed is not None}
 
 
 def points(

@@ -78,6 +78,7 @@ class Report:
         self.entries: list[Entry] = folder.entries()
         self.detectors: list[str] = [config["name"] for config in self.experiment["detectors"]]
         self.metrics = MetricChoice(self.experiment["metrics"])
+        self.settings: dict[str, Any] = {**self.experiment["intervals"], "seed": self.experiment["seed"]}
 
     @cached_property
     def scored(self) -> list[Scored]:
@@ -90,8 +91,9 @@ class Report:
         groups: dict[tuple[str, ...], list[Scored]] = defaultdict(list)
         for one in self.scored:
             groups[one.dataset, one.source, one.scoring, one.table, one.detector].append(one)
-        settings = {**self.experiment["intervals"], "seed": self.experiment["seed"]}
-        rows = [(self._about(members), estimates_of(self.metrics, members, settings)) for members in groups.values()]
+        rows = [
+            (self._about(members), estimates_of(self.metrics, members, self.settings)) for members in groups.values()
+        ]
         rows.sort(key=lambda row: self._rank(*row))
         return rows
 
@@ -150,7 +152,6 @@ class Report:
         for one in self.scored:
             order = one.table, one.scoring, self.detectors.index(one.detector), one.dataset, one.channel or 0
             groups[*order, one.material, one.source].append(one)
-        settings = {**self.experiment["intervals"], "seed": self.experiment["seed"]}
         rows = []
         for _, members in sorted(groups.items(), key=lambda item: item[0]):
             first = members[0]
@@ -158,7 +159,7 @@ class Report:
             row = {key: getattr(first, key) for key in keys} | {"captures": len(members)}
             row["frames"] = sum(len(one.outcome.group) for one in members)
             row["errors"] = errors_in(one.outcome for one in members)
-            rows.append(row | _columns(estimates_of(self.metrics, members, settings)))
+            rows.append(row | _columns(estimates_of(self.metrics, members, self.settings)))
         return pd.DataFrame(rows)
 
     @cached_property

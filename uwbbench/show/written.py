@@ -61,7 +61,8 @@ def as_text(report: Report, form: Format, roots: Sequence[Path]) -> str:
     ReportToolsError
         If the libraries that a page needs are not installed.
     """
-    from uwbbench.show.text import formats, markdown
+    from uwbbench.show.text import formats
+    from uwbbench.show.text.report import markdown
 
     if form is Format.HTML:
         from uwbbench.show.page import Content, page
@@ -151,7 +152,7 @@ def write_into_run(report: Report, roots: Sequence[Path]) -> tuple[Path, str]:
         Why there is no page; empty where there is.
     """
     from uwbbench.show.extras import ReportToolsError
-    from uwbbench.show.text import write_report
+    from uwbbench.show.text.report import write_report
 
     path = write_report(report)
     try:

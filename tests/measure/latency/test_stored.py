@@ -11,7 +11,7 @@ from uwbbench.results import Report
 from uwbbench.run import run_experiment
 from uwbbench.run.experiment import read_experiment
 from uwbbench.run.folder import RunFolder
-from uwbbench.show.text import markdown
+from uwbbench.show.text.report import markdown
 
 ADDED = (
     "missed_share_low",

@@ -22,11 +22,9 @@ from uwbbench.api.metric import Metric, Outcome
 from uwbbench.measure.accuracy.scoring import ScoringRules, outcomes
 from uwbbench.measure.accuracy.stats import Difference, evaluate, holm, paired_difference
 from uwbbench.results.comparison.units import Unit
-from uwbbench.results.pareto import NORMAL_975, Speed, speed_of
+from uwbbench.results.pareto import NORMAL_975, Speed, speeds_of_run
+from uwbbench.results.slices import Board
 from uwbbench.run.folder.folder import RunFolder
-
-Board = tuple[str, str, str, str]
-"""Dataset, source, scoring and table."""
 
 
 @dataclass(frozen=True)
@@ -137,7 +135,7 @@ def _changes(
 
 def time_changes(first: RunFolder, second: RunFolder) -> tuple[list[TimeChange], list[str]]:
     """Time ratios that both runs measured, and what could not be compared."""
-    sides = [_speeds(folder) for folder in (first, second)]
+    sides = [speeds_of_run(folder.entries()) for folder in (first, second)]
     identities = [folder.manifest.get("reference") for folder in (first, second)]
     compared, missing = [], dict[str, None]()
     for (dataset, detector), before in sides[0].items():
@@ -153,12 +151,3 @@ def time_changes(first: RunFolder, second: RunFolder) -> tuple[list[TimeChange],
         ends = [math.exp(value) for value in (middle, middle - reach, middle + reach)]
         compared.append(TimeChange(dataset, detector, before, after, *ends))
     return compared, list(missing)
-
-
-def _speeds(folder: RunFolder) -> dict[tuple[str, str], Speed]:
-    timed: dict[tuple[str, str], list[Any]] = defaultdict(list)
-    for entry in folder.entries():
-        if (entry.kind, entry.status) == ("latency", "done"):
-            timed[entry.dataset, entry.detector].append(entry)
-    known = {key: speed_of(entries) for key, entries in timed.items()}
-    return {key: speed for key, speed in known.items() if speed is not None}

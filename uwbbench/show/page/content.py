@@ -17,7 +17,7 @@ from uwbbench.measure.accuracy.stats import MINIMUM_GROUPS
 from uwbbench.results import radargram
 from uwbbench.results.cases import Case, cases
 from uwbbench.results.curves import error_curve
-from uwbbench.results.pareto import Speed, points, speed_of
+from uwbbench.results.pareto import Speed, points, speeds_of_run
 from uwbbench.results.report import Report
 from uwbbench.results.results import Scored
 from uwbbench.results.slices import ALL, Board, Slice, cuts, range_edges_m, slices, span_name
@@ -56,7 +56,6 @@ class Content:
 
     def __init__(self, report: Report, roots: Sequence[Path] | None = None) -> None:
         self.report, self.roots = report, roots
-        self.settings = {**report.experiment["intervals"], "seed": report.experiment["seed"]}
         self.detectors = labels(report.detectors)
         self.datasets = labels(used["label"] for used in report.experiment["datasets"])
         self.quantities = Quantity.of_all(report.metrics)
@@ -80,20 +79,14 @@ class Content:
             ((about["dataset"], about["source"], about["scoring"], about["table"]), about["detector"]): estimates
             for about, estimates in self.report.estimates
         }
-        return list(slices(self.report.scored, self.report.metrics, self.edges_m, self.settings, known))
+        return list(slices(self.report.scored, self.report.metrics, self.edges_m, self.report.settings, known))
 
     @cached_property
     def speeds(self) -> dict[str, dict[str, Speed]]:
         """Speed of each detector by dataset."""
-        timed: dict[tuple[str, str], list[Any]] = defaultdict(list)
-        for entry in self.report.entries:
-            if (entry.kind, entry.status) == ("latency", "done"):
-                timed[entry.dataset, entry.detector].append(entry)
         speeds: dict[str, dict[str, Speed]] = defaultdict(dict)
-        for (dataset, detector), entries in timed.items():
-            speed = speed_of(entries)
-            if speed is not None:
-                speeds[dataset][detector] = speed
+        for (dataset, detector), speed in speeds_of_run(self.report.entries).items():
+            speeds[dataset][detector] = speed
         return speeds
 
     @cached_property
@@ -168,7 +161,7 @@ class Content:
         for one in self.boards[board]:
             members[one.detector].append(one)
         speeds = self.speeds.get(board[0], {})
-        placed = points(members, speeds, self.report.metrics[name], self.settings)
+        placed = points(members, speeds, self.report.metrics[name], self.report.settings)
         if not placed:
             return None
         quantity = self.quantities[name]

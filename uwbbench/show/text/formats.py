@@ -20,7 +20,7 @@ import pandas as pd
 
 from uwbbench.api.errors import StoreError
 from uwbbench.api.text import one_line
-from uwbbench.results.report import Report
+from uwbbench.results.report import Report, facts_of
 from uwbbench.run.folder.files import write_json, write_text
 from uwbbench.run.folder.identity import plain
 from uwbbench.show.extras import report_tools
@@ -99,8 +99,7 @@ def _csv_tables(report: Report) -> dict[str, list[dict[str, Any]]]:
         "stability": stability,
         "failures": [{key: getattr(entry, key) for key in keys} for entry in report.failures],
         "unscored": [
-            {"detector": e.detector, "dataset": e.dataset, "capture": e.capture, "scoring": scoring, "reason": reason}
-            for e, scoring, reason in report.unscored
+            {**facts_of(entry), "scoring": scoring, "reason": reason} for entry, scoring, reason in report.unscored
         ],
     }
 
