@@ -73,7 +73,21 @@ def values_of(found: Detections) -> Values:
 
 
 def streamed(pipeline: Pipeline, capture: Capture, cuts: Sequence[int]) -> tuple[Detections, tuple[str, ...]]:
-    """Detections and notes of a capture handed over in pieces."""
+    """Detections and notes of a capture handed over in pieces.
+
+    Parameters
+    ----------
+    pipeline : Pipeline
+    capture : Capture
+    cuts : sequence of int
+        Frames, ascending, before which the capture is cut; a number that occurs twice makes an empty piece.
+
+    Returns
+    -------
+    detections : Detections
+        Of all pieces and the flush.
+    notes : tuple of str
+    """
     stream = pipeline.open(capture)
     parts = [stream.step(capture.frames(start, stop)) for start, stop in pairwise([0, *cuts, len(capture)])]
     return Detections.join([*parts, stream.flush()]), stream.notes

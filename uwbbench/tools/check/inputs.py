@@ -69,7 +69,14 @@ def frames_of(capture: Capture) -> Frames:
 
 
 def cut(block: Block, start: int, stop: int) -> Block:
-    """Frames ``start`` to ``stop`` of a block, with their detections."""
+    """Frames ``start`` to ``stop`` of a block, with their detections.
+
+    Parameters
+    ----------
+    block : Block
+    start, stop : int
+        First frame, and the one after the last, counted from the start of the block.
+    """
     rows = block.rows
     parts = {
         name: value[start:stop]

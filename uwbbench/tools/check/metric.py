@@ -23,7 +23,20 @@ _METRIC = "uwbbench.api.metric.Metric"
 
 
 def outcome(seed: int, *, missed: float = 0.1, false: float = 0.1, bias_m: float = 0.02, sd_m: float = 0.05) -> Outcome:
-    """Outcome of 200 frames, each with an object that is found or missed, and at most one false alarm."""
+    """Outcome of 200 frames, each with an object that is found or missed, and at most one false alarm.
+
+    Parameters
+    ----------
+    seed : int
+        Of the random numbers.
+    missed : float
+        Probability that the object of a frame is missed.
+    false : float
+        Probability of a false alarm in a frame.
+    bias_m, sd_m : float
+        Mean and standard deviation of the range errors of matches, which are normal; those of false alarms are uniform
+        from 0.3 m to 1 m.
+    """
     rng = np.random.default_rng(seed)
     tp = (rng.uniform(size=FRAMES) >= missed).astype(np.int64)
     fp = (rng.uniform(size=FRAMES) < false).astype(np.int64)

@@ -74,7 +74,16 @@ class StageSubject(ClassSubject):
         return declared_parts(block, self.cls.consumes, self.cls.needs)
 
     def run(self, block: Block, cuts: Sequence[int] = (), stage: Stage[Any] | None = None) -> Values:
-        """What the stage yields for a block handed over in pieces, the flush included."""
+        """What the stage yields for a block handed over in pieces, the flush included.
+
+        Parameters
+        ----------
+        block : Block
+        cuts : sequence of int
+            Frames of the block, ascending, before which it is cut.
+        stage : Stage, optional
+            Opened instance; a fresh one where there is none.
+        """
         stage = stage or self.opened()
         yielded = [stage.step(piece) for piece in pieces(block, cuts)]
         tail = stage.flush()
@@ -101,7 +110,16 @@ class StageSubject(ClassSubject):
 
 
 def declared_parts(block: Block, consumes: frozenset[str], needs: frozenset[str]) -> Block:
-    """Block without the parts, columns and reported values that are not among these."""
+    """Block without the parts, columns and reported values that are not among these.
+
+    Parameters
+    ----------
+    block : Block
+    consumes : frozenset of str
+        Ports to keep. Without ``detections`` among them, no detection is left.
+    needs : frozenset of str
+        What else of the capture to keep: ``sts`` responses, the reported ``first_path``.
+    """
     columns: dict[str, Any] = {n: v for n, v in block.detections.columns.items() if n == "frame" or n in consumes}
     frame = columns.pop("frame")
     found = Detections.empty(block.frames.index)

@@ -114,6 +114,16 @@ def subject_of(
 ) -> Subject:
     """Plugin to be examined.
 
+    Parameters
+    ----------
+    kind : {"stage", "detector", "dataset", "metric"}
+    name : str
+        Registered name; of a detector, also the path of its YAML file.
+    params : mapping, optional
+        Parameters to examine it with; of a detector, values to change by path.
+    roots : sequence of Path
+        Folders that a dataset searches.
+
     Raises
     ------
     PluginError, ConfigError

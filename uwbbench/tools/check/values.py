@@ -70,7 +70,20 @@ def _difference(one: NDArray[Any], other: NDArray[Any]) -> str:
 
 
 def same(one: Mapping[str, NDArray[Any]], other: Mapping[str, NDArray[Any]], expected: str) -> None:
-    """Raise :class:`Nonconformity` unless both are bit-equal."""
+    """Raise :class:`Nonconformity` unless both are bit-equal.
+
+    Parameters
+    ----------
+    one, other : mapping of str to array
+        Results of the first and the second time.
+    expected : str
+        What was expected, for the message.
+
+    Raises
+    ------
+    Nonconformity
+        With the first difference.
+    """
     told = difference(one, other)
     if told:
         raise Nonconformity(expected, told)

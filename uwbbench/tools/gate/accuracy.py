@@ -54,6 +54,14 @@ class Found:
 def found_on(gate: Gate, worker: Worker, ref: CaptureRef) -> Found:
     """Run the head on a capture.
 
+    Parameters
+    ----------
+    gate : Gate
+        Its accuracy rules decide whether the peaks before the filters are wanted too.
+    worker : Worker
+        In the environment of the head.
+    ref : CaptureRef
+
     Raises
     ------
     SetUpError
@@ -73,6 +81,16 @@ def found_on(gate: Gate, worker: Worker, ref: CaptureRef) -> Found:
 
 def accuracy_check(gate: Gate, rule: AccuracyModel, label: str, found: list[Found]) -> Check:
     """One limit on one dataset.
+
+    Parameters
+    ----------
+    gate : Gate
+    rule : AccuracyModel
+        Metric, and its limit or the stored run to compare with.
+    label : str
+        Name of the dataset, for people.
+    found : list of Found
+        What the head found on each capture of the dataset.
 
     Raises
     ------

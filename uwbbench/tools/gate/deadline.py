@@ -16,6 +16,19 @@ def deadline_checks(gate: Gate, settings: DeadlineModel, label: str, ref: Captur
 
     More frames are measured as long as the bounds hold the limit, up to ``patience`` times as many.
 
+    Parameters
+    ----------
+    gate : Gate
+    settings : DeadlineModel
+    label : str
+        Name of the capture, for people.
+    ref : CaptureRef
+
+    Returns
+    -------
+    list of Check
+        The share, and the longest burst where it is limited.
+
     Raises
     ------
     SetUpError
@@ -75,7 +88,16 @@ def deadline_checks(gate: Gate, settings: DeadlineModel, label: str, ref: Captur
 
 
 def share_verdict(missed: int, low: float, high: float, settings: DeadlineModel) -> GateVerdict:
-    """GateVerdict of a share with its bounds; where none is allowed, none seen is all that can be asked for."""
+    """Verdict on a share of missed deadlines; where none is allowed, none seen is all that can be asked for.
+
+    Parameters
+    ----------
+    missed : int
+        Missed deadlines.
+    low, high : float
+        Bounds of their share.
+    settings : DeadlineModel
+    """
     if low > settings.maximum_missed_share:
         return GateVerdict.REGRESSION
     none_allowed = settings.maximum_missed_share == 0 and missed == 0

@@ -18,18 +18,18 @@ from uwbbench.tools.gate.deadline import deadline_checks
 from uwbbench.tools.gate.latency import latency_checks
 from uwbbench.tools.gate.link import worker_of
 
-Told = Callable[[str], None]
+Progress = Callable[[str], None]
 Listed = Mapping[str, Sequence[CaptureRef]]
 
 
-def run_gate(gate: Gate, tell: Told = lambda _: None) -> GateResult:
+def run_gate(gate: Gate, progress: Progress = lambda _: None) -> GateResult:
     """Make all checks of a gate: accuracy, deadlines, then speed against the base.
 
     Parameters
     ----------
     gate : Gate
-    tell : callable
-        Told what is being done.
+    progress : callable
+        Called with what is being done.
 
     Returns
     -------
@@ -40,16 +40,16 @@ def run_gate(gate: Gate, tell: Told = lambda _: None) -> GateResult:
     listed = _listed(gate, checks)
     model = gate.model
     for label, refs in listed.items():
-        checks += _accuracy(gate, label, refs, tell)
+        checks += _accuracy(gate, label, refs, progress)
     if model.deadline is not None:
         deadline = model.deadline
         for label, ref in _timed(listed, deadline.captures):
-            tell(f"deadlines on {label}")
+            progress(f"deadlines on {label}")
             checks += _made("deadline", label, partial(deadline_checks, gate, deadline, label, ref))
     if model.latency is not None and gate.base is not None:
         latency, base = model.latency, gate.base
         for label, ref in _timed(listed, latency.captures):
-            checks += _made("latency", label, partial(latency_checks, gate, base, latency, label, ref, tell))
+            checks += _made("latency", label, partial(latency_checks, gate, base, latency, label, ref, progress))
     return GateResult(gate.name, gate.head.text, "" if gate.base is None else gate.base.text, tuple(checks), machine())
 
 
@@ -73,12 +73,12 @@ def _timed(listed: Listed, captures: Captures) -> list[tuple[str, CaptureRef]]:
     ]
 
 
-def _accuracy(gate: Gate, label: str, refs: Sequence[CaptureRef], tell: Told) -> list[Check]:
+def _accuracy(gate: Gate, label: str, refs: Sequence[CaptureRef], progress: Progress) -> list[Check]:
     """All limits of one dataset."""
     rules = [rule for rule in gate.model.accuracy if rule.dataset in (None, label)]
     if not rules:
         return []
-    tell(f"accuracy on {label}")
+    progress(f"accuracy on {label}")
     started = perf_counter()
     try:
         with worker_of(gate.head, gate.model.timeout_s) as worker:

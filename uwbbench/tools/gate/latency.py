@@ -23,11 +23,11 @@ from uwbbench.tools.gate.rule import Sampler, canary, compared
 MINIMUM_FRAMES = 100
 """With fewer frames the processor learns them by heart, and their times say little of new ones."""
 
-Told = Callable[[str], None]
+Progress = Callable[[str], None]
 
 
 def latency_checks(
-    gate: Gate, base: Side, settings: LatencyGateModel, label: str, ref: CaptureRef, tell: Told
+    gate: Gate, base: Side, settings: LatencyGateModel, label: str, ref: CaptureRef, progress: Progress
 ) -> list[Check]:
     """Base against base, then base against head, on one capture.
 
@@ -39,8 +39,8 @@ def latency_checks(
     label : str
         Name of the capture, for people.
     ref : CaptureRef
-    tell : callable
-        Told what is being done.
+    progress : callable
+        Called with what is being done.
 
     Returns
     -------
@@ -53,15 +53,38 @@ def latency_checks(
         If one of the sides cannot be measured.
     """
     if base.python != gate.head.python:
-        return _separately(gate, base, settings, label, ref, tell)
+        return _separately(gate, base, settings, label, ref, progress)
     with worker_of(base, gate.model.timeout_s) as worker:
-        return checks_within(worker, base, gate.head, settings, label, ref, tell)
+        return checks_within(worker, base, gate.head, settings, label, ref, progress)
 
 
 def checks_within(
-    worker: Worker, base: Side, head: Side, settings: LatencyGateModel, label: str, ref: CaptureRef, tell: Told
+    worker: Worker, base: Side, head: Side, settings: LatencyGateModel, label: str, ref: CaptureRef, progress: Progress
 ) -> list[Check]:
-    """The same for two detectors of one environment, in a process that is there already."""
+    """The same for two detectors of one environment, in a process that is there already.
+
+    Parameters
+    ----------
+    worker : Worker
+        In the environment of both.
+    base, head : Side
+    settings : LatencyGateModel
+    label : str
+        Name of the capture, for people.
+    ref : CaptureRef
+    progress : callable
+        Called with what is being done.
+
+    Returns
+    -------
+    list of Check
+        The canary, and the comparison; one check alone where there are too few frames.
+
+    Raises
+    ------
+    SetUpError
+        If one of the sides cannot be measured.
+    """
     joined = {
         player: join(worker, player, side, ref, settings.frames, settings.warmup_windows)
         for player, side in (("base", base), ("base again", base), ("head", head))
@@ -72,11 +95,11 @@ def checks_within(
         return few
     size = turn_frames([found["call_s"] for found in joined.values()], joined["base"]["frames"])
     again, other = (partial(_blocks, worker, player, size) for player in ("base again", "head"))
-    return _judged(label, settings, again, other, settings.blocks, "blocks", tell)
+    return _judged(label, settings, again, other, settings.blocks, "blocks", progress)
 
 
 def _separately(
-    gate: Gate, base: Side, settings: LatencyGateModel, label: str, ref: CaptureRef, tell: Told
+    gate: Gate, base: Side, settings: LatencyGateModel, label: str, ref: CaptureRef, progress: Progress
 ) -> list[Check]:
     """The same for two environments, in fresh pairs of processes."""
     with worker_of(gate.head, gate.model.timeout_s) as there, worker_of(base, gate.model.timeout_s) as here:
@@ -93,7 +116,7 @@ def _separately(
         partial(pairs, base, gate.head),
         settings.processes,
         "processes",
-        tell,
+        progress,
     )
 
 
@@ -155,14 +178,14 @@ def _too_few(label: str, joined: dict[str, Any]) -> list[Check]:
 
 
 def _judged(
-    label: str, settings: LatencyGateModel, again: Sampler, head: Sampler, minimum: int, counted: str, tell: Told
+    label: str, settings: LatencyGateModel, again: Sampler, head: Sampler, minimum: int, counted: str, progress: Progress
 ) -> list[Check]:
     limits: dict[str, Any] = {
         "minimum": minimum,
         "patience": settings.patience,
         "limit": settings.maximum_ratio,
     }
-    tell(f"base against base on {label}")
+    progress(f"base against base on {label}")
     ratio, verdict = canary(again, **limits)
     first = _check("canary", f"base against base on {label}", ratio, verdict, counted, settings)
     if verdict is not GateVerdict.PASS:
@@ -174,7 +197,7 @@ def _judged(
             reason="not measured: base against base has not passed",
         )
         return [first, unmeasured]
-    tell(f"head against base on {label}")
+    progress(f"head against base on {label}")
     ratio, verdict = compared(head, **limits)
     return [first, _check("latency", f"head against base on {label}", ratio, verdict, counted, settings)]
 

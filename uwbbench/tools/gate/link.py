@@ -151,14 +151,59 @@ def worker_of(side: Side, timeout_s: float) -> Worker:
 
 
 def join(worker: Worker, player: str, side: Side, ref: CaptureRef, frames: int, windows: int) -> dict[str, Any]:
-    """Load a side's detector and frames of a capture in a worker, and warm up; what the worker tells of them."""
+    """Load a side's detector and frames of a capture in a worker, and warm up.
+
+    Parameters
+    ----------
+    worker : Worker
+    player : str
+        Name that later requests use.
+    side : Side
+    ref : CaptureRef
+    frames : int
+        Frames used at most, from the start of the capture.
+    windows : int
+        Windows of warm-up at most, if their times never agree.
+
+    Returns
+    -------
+    dict
+        Median time of a call ``call_s``, number of ``frames``, hash of their ``content``, ``frame_rate_hz`` and
+        ``source``.
+
+    Raises
+    ------
+    SetUpError
+        If the worker cannot load or run them.
+    """
     return worker.ask(
         "join", player=player, detector=_detector(side), capture=asdict(ref), frames=frames, windows=windows
     )
 
 
 def detect(worker: Worker, side: Side, ref: CaptureRef, *, candidates: bool, to: Path) -> dict[str, Any]:
-    """Run a side's detector on a whole capture in a worker; detections go into a file."""
+    """Run a side's detector on a whole capture in a worker; detections go into a file.
+
+    Parameters
+    ----------
+    worker : Worker
+    side : Side
+    ref : CaptureRef
+    candidates : bool
+        Whether to write the peaks before the filters too, next to the detections as ``*.candidates.parquet``.
+    to : Path
+        Parquet file for the detections.
+
+    Returns
+    -------
+    dict
+        Hash of the capture's content ``sha256``, and its number of ``frames``.
+
+    Raises
+    ------
+    SetUpError
+        If the worker cannot load or run them.
+    """
     return worker.ask("detect", detector=_detector(side), capture=asdict(ref), candidates=candidates, to=str(to))
 
 

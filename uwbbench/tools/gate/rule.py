@@ -99,11 +99,31 @@ def sampled(
 
 
 def compared(sampler: Sampler, *, minimum: int, patience: int, limit: float) -> tuple[Ratio, GateVerdict]:
-    """Base against head, by the rule above."""
+    """Base against head, by the rule above.
+
+    Parameters
+    ----------
+    sampler : callable
+        Measures so many log ratios of head to base.
+    minimum, patience : int
+        As in :func:`sampled`.
+    limit : float
+        Ratio of times up to which the head is not too slow.
+    """
     ratio, verdict = sampled(sampler, minimum, patience, lambda ratio: against(ratio, limit))
     return ratio, verdict if verdict is not GateVerdict.INCONCLUSIVE else finally_against(ratio, limit)
 
 
 def canary(sampler: Sampler, *, minimum: int, patience: int, limit: float) -> tuple[Ratio, GateVerdict]:
-    """Base against base: pass where they look equal, invalid where they differ, else inconclusive."""
+    """Base against base: pass where they look equal, invalid where they differ, else inconclusive.
+
+    Parameters
+    ----------
+    sampler : callable
+        Measures so many log ratios of base to base.
+    minimum, patience : int
+        As in :func:`sampled`.
+    limit : float
+        Equal detectors have a ratio of times within 1 / ``limit`` and ``limit``.
+    """
     return sampled(sampler, minimum, patience, lambda ratio: of_equals(ratio, limit))

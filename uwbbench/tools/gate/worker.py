@@ -30,7 +30,27 @@ class Session:
     def join(
         self, player: str, detector: dict[str, Any], capture: dict[str, Any], frames: int, windows: int
     ) -> dict[str, Any]:
-        """Load a detector and frames of a capture, and warm up."""
+        """Load a detector and frames of a capture, and warm up.
+
+        Parameters
+        ----------
+        player : str
+            Name that later requests use.
+        detector : dict
+            Name or file (``use``) and values to change in it (``set``).
+        capture : dict
+            Fields of a :class:`~uwbbench.config.source.CaptureRef`.
+        frames : int
+            Frames used at most, from the start of the capture.
+        windows : int
+            Windows of warm-up at most, if their times never agree.
+
+        Returns
+        -------
+        dict
+            Median time of a call ``call_s``, number of ``frames``, hash of their ``content``, ``frame_rate_hz`` and
+            ``source``.
+        """
         from uwbbench.measure.latency.player import Player
 
         opened = _opened(capture)
@@ -50,7 +70,22 @@ class Session:
         return {"spent_s": self._players[player].turn(size)}
 
     def blocks(self, base: str, head: str, size: int, count: int) -> dict[str, Any]:
-        """Log ratios of two players of this process."""
+        """Log ratios of two players of this process.
+
+        Parameters
+        ----------
+        base, head : str
+            Players that take turns.
+        size : int
+            Frames of a turn.
+        count : int
+            Blocks of turns.
+
+        Returns
+        -------
+        dict
+            ``log_ratios`` of head to base, one a block.
+        """
         from uwbbench.measure.latency.player import in_turns
         from uwbbench.measure.latency.ratio import log_ratios
 
@@ -58,11 +93,42 @@ class Session:
         return {"log_ratios": log_ratios(times_s[:, 1], times_s[:, 0]).tolist()}
 
     def respond(self, player: str, count: int, rate_hz: float, paced: bool) -> dict[str, Any]:
-        """Response times of single frames."""
+        """Response times of single frames.
+
+        Parameters
+        ----------
+        player : str
+        count : int
+            Frames; a shorter capture is repeated.
+        rate_hz : float
+            Rate at which frames are due.
+        paced : bool
+            Hand out frames at that rate, or each when the one before is answered.
+
+        Returns
+        -------
+        dict
+            ``responses_us`` of each frame.
+        """
         return {"responses_us": self._players[player].responses_us(count, rate_hz, paced=paced).tolist()}
 
     def detect(self, detector: dict[str, Any], capture: dict[str, Any], candidates: bool, to: str) -> dict[str, Any]:
-        """Run a detector on a whole capture; detections, and the peaks before its filters, go into files."""
+        """Run a detector on a whole capture; detections, and the peaks before its filters, go into files.
+
+        Parameters
+        ----------
+        detector, capture : dict
+            As in :meth:`join`.
+        candidates : bool
+            Whether to write the peaks before the filters too, next to the detections as ``*.candidates.parquet``.
+        to : str
+            Parquet file for the detections.
+
+        Returns
+        -------
+        dict
+            Hash of the capture's content ``sha256``, and its number of ``frames``.
+        """
         from uwbbench.run.folder.tables import write_detections
 
         opened = _opened(capture)

@@ -91,6 +91,12 @@ def refuse_leaks(tuning: Sequence[Labelled], held_out: Sequence[Labelled], exper
 
     Captures are compared by their content, whatever their names and files are.
 
+    Parameters
+    ----------
+    tuning, held_out : sequence of Labelled
+    experiment : Experiment or None
+        Experiment that will score the tuned detectors; None where there is none.
+
     Raises
     ------
     ConfigError
@@ -122,6 +128,17 @@ def grouped(by: Sequence[By], tuning: Sequence[Labelled], held_out: Sequence[Lab
     """Groups of the tuning captures, each with the held-out captures of its kind.
 
     Captures with obstacles of several materials belong to no material.
+
+    Parameters
+    ----------
+    by : sequence of {"overall", "material", "channel", "material-channel"}
+        What groups are made by.
+    tuning, held_out : sequence of Labelled
+
+    Returns
+    -------
+    tuple of Group
+        Those with at least one tuning capture.
     """
     materials = sorted({one.materials[0] for one in tuning if len(one.materials) == 1})
     channels = sorted({one.capture.radar.channel for one in tuning if one.capture.radar.channel is not None})

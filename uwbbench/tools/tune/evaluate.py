@@ -63,6 +63,14 @@ def outcomes_of(
 ) -> list[Outcome]:
     """Outcome of each capture.
 
+    Parameters
+    ----------
+    detector : Pipeline
+    captures : sequence of Labelled
+    rules : ScoringRules
+    table : str
+        Table of results, ``filtering`` or ``mapping``.
+
     Raises
     ------
     ScoringError
@@ -83,6 +91,14 @@ def _judged(found: Detections, one: Labelled, rules: ScoringRules, table: str) -
 def scores_of_sets(swept: Swept, one: Labelled, rules: ScoringRules) -> SetScores:
     """Scores of all sets of a sweep on one capture: together where each retains one detection a frame, else in turn.
 
+    Parameters
+    ----------
+    swept : Swept
+        Sweep over the peaks of the capture.
+    one : Labelled
+        The capture.
+    rules : ScoringRules
+
     Raises
     ------
     ScoringError
@@ -97,7 +113,17 @@ def scores_of_sets(swept: Swept, one: Labelled, rules: ScoringRules) -> SetScore
 
 
 def result_of(found: Sequence[Outcome], intervals: IntervalModel | None, seed: int = 0) -> Result:
-    """Result over all outcomes together, with an interval where one is asked for."""
+    """Result over all outcomes together, with an interval where one is asked for.
+
+    Parameters
+    ----------
+    found : sequence of Outcome
+        One a capture.
+    intervals : IntervalModel or None
+        How the interval of F1 is estimated; None for no interval.
+    seed : int
+        Of the resampling.
+    """
     estimate = None
     if intervals is not None:
         estimate = bootstrap(F1, found, resamples=intervals.resamples, confidence=intervals.confidence, seed=seed)

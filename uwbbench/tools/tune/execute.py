@@ -20,7 +20,7 @@ from uwbbench.tools.tune.evaluate import Result, outcomes_of, result_of, scores_
 from uwbbench.tools.tune.search import require_optuna, search, within
 from uwbbench.tools.tune.sweep.scores import SetScores
 
-Tell = Callable[[str], None]
+Progress = Callable[[str], None]
 
 
 @dataclass(frozen=True)
@@ -80,13 +80,13 @@ class TuneOutcome:
     notes: tuple[str, ...]
 
 
-def tune(tuning: Tuning, tell: Tell = lambda _: None) -> TuneOutcome:
+def tune(tuning: Tuning, progress: Progress = lambda _: None) -> TuneOutcome:
     """Tune a detector for each group of captures.
 
     Parameters
     ----------
     tuning : Tuning
-    tell : callable
+    progress : callable
         Receives what is being done, for people.
 
     Returns
@@ -102,20 +102,20 @@ def tune(tuning: Tuning, tell: Tell = lambda _: None) -> TuneOutcome:
     """
     if tuning.model.search is not None:
         require_optuna()
-    tell("opening captures")
+    progress("opening captures")
     captures, held_out = opened(tuning.tuning), opened(tuning.held_out)
-    tell("comparing their contents")
+    progress("comparing their contents")
     refuse_leaks(captures, held_out, tuning.experiment)
     groups = grouped(tuning.model.groups, captures, held_out)
     if not groups:
         raise ConfigError(
             f"{tuning.name}: the tuning captures make none of the groups {', '.join(tuning.model.groups)}"
         )
-    swept = {} if tuning.sweep is None else _swept(tuning, captures, tell)
+    swept = {} if tuning.sweep is None else _swept(tuning, captures, progress)
     found = []
     for group in groups:
-        tell(f"tuning for {group.text}")
-        found.append(_of_grid(tuning, group, swept) if tuning.sweep is not None else _of_search(tuning, group, tell))
+        progress(f"tuning for {group.text}")
+        found.append(_of_grid(tuning, group, swept) if tuning.sweep is not None else _of_search(tuning, group, progress))
     return TuneOutcome(tuning, tuple(found), captures, held_out, _notes(tuning, captures, found))
 
 
@@ -125,12 +125,12 @@ def variant(tuning: Tuning, values: Mapping[str, Any]) -> Pipeline:
     return Pipeline(check_detector(data, YamlFile(tuning.name, data, {})))
 
 
-def _swept(tuning: Tuning, captures: Sequence[Labelled], tell: Tell) -> dict[int, SetScores]:
+def _swept(tuning: Tuning, captures: Sequence[Labelled], progress: Progress) -> dict[int, SetScores]:
     """Scores of all sets of the grid on each capture."""
     assert tuning.sweep is not None  # noqa: S101
     found = {}
     for number, one in enumerate(captures, 1):
-        tell(f"{len(tuning.sweep)} sets on capture {number} of {len(captures)}: {one.text}")
+        progress(f"{len(tuning.sweep)} sets on capture {number} of {len(captures)}: {one.text}")
         found[id(one)] = scores_of_sets(tuning.sweep.run(one.capture), one, tuning.rules)
     return found
 
@@ -150,7 +150,7 @@ def _of_grid(tuning: Tuning, group: Group, swept: Mapping[int, SetScores]) -> Tu
     return _concluded(tuning, group, columns, scores, best, zone)
 
 
-def _of_search(tuning: Tuning, group: Group, tell: Tell) -> Tuned:
+def _of_search(tuning: Tuning, group: Group, progress: Progress) -> Tuned:
     model = tuning.model.search
     assert model is not None  # noqa: S101
     tried: list[dict[str, Any]] = []
@@ -161,7 +161,7 @@ def _of_search(tuning: Tuning, group: Group, tell: Tell) -> Tuned:
         tried.append(values)
         parts.append(SetScores.merged([scores_of(outcome) for outcome in made]))
         f1 = float(parts[-1].f1[0])
-        tell(f"{group.text}: trial {len(tried)} of {model.trials}, F1 {f1:.3f}")
+        progress(f"{group.text}: trial {len(tried)} of {model.trials}, F1 {f1:.3f}")
         return 0.0 if np.isnan(f1) else f1
 
     search(model, f1_of, _as_it_is(tuning, model))

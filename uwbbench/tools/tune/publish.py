@@ -94,7 +94,21 @@ def detector_name(outcome: TuneOutcome, tuned: Tuned) -> str:
 
 
 def detector_yaml(outcome: TuneOutcome, tuned: Tuned, folder: Path) -> str:
-    """Detector file with the tuned values, as it must stand in ``folder``."""
+    """Detector file with the tuned values, as it must stand in ``folder``.
+
+    Parameters
+    ----------
+    outcome : TuneOutcome
+    tuned : Tuned
+        Group of it that the detector is tuned for.
+    folder : Path
+        Where the file will lie: the path of the detector that it extends is relative to it.
+
+    Returns
+    -------
+    str
+        YAML.
+    """
     import yaml
 
     tuning = outcome.tuning

@@ -190,7 +190,20 @@ class Swept:
 
     @classmethod
     def of(cls, sweep: Sweep, found: Detections, rows: IntArray, corner: IntArray, count: int | None) -> Swept:
-        """Sweep over the peaks in ``rows`` (n,), which stand by frame and rank."""
+        """Sweep over the peaks in ``rows`` (n,), which stand by frame and rank.
+
+        Parameters
+        ----------
+        sweep : Sweep
+        found : Detections
+            All peaks of a capture.
+        rows : (n,) int array
+            Those that at least one set of thresholds lets pass, ordered by frame and then by rank.
+        corner : (n, axes) int array
+            Cell of the strictest thresholds that each of them passes.
+        count : int or None
+            Detections that a set retains in a frame; None for all.
+        """
         from uwbbench.tools.tune.sweep.kernels import regions  # imports numba
 
         frame = found.frame[rows]
