@@ -132,8 +132,9 @@ def slowed(worker: Worker, ref: CaptureRef, folder: Path, detector: str, slowdow
 def measured(worker: Worker, base: Side, head: Side, ref: CaptureRef) -> Ratio:
     """Ratio of two detectors from many blocks."""
     sides = {"base": base, "head": head}
-    call_s = [join(worker, player, side, ref, SETTINGS.frames, 10)["call_s"] for player, side in sides.items()]
-    asked = {"size": turn_frames(call_s), "count": CALIBRATION_BLOCKS}
+    joined = [join(worker, player, side, ref, SETTINGS.frames, 10) for player, side in sides.items()]
+    size = turn_frames([found["call_s"] for found in joined], joined[0]["frames"])
+    asked = {"size": size, "count": CALIBRATION_BLOCKS}
     return Ratio.of(worker.ask("blocks", base="base", head="head", **asked)["log_ratios"])
 
 

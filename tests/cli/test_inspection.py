@@ -62,7 +62,9 @@ def test_show_a_stage_gives_parameters_ports_and_fidelity(uwbbench) -> None:
 def test_everything_listed_can_be_shown(uwbbench, kind) -> None:
     for row in json.loads(uwbbench("list", kind, "--json").stdout)[kind]:
         assert kind[:-1] in json.loads(uwbbench("show", row["name"], "--json").stdout)
-        assert uwbbench("show", row["name"]).stdout
+        shown = uwbbench("show", row["name"]).stdout
+        assert shown
+        assert "`" not in shown, "markup of a docstring"
 
 
 def test_show_a_dataset_gives_its_card(uwbbench) -> None:

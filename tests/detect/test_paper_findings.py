@@ -44,9 +44,8 @@ def found_by_paper(capture: Capture, changes: Mapping[str, Any] | None = None) -
 def approaches(material: str, channel: int) -> tuple[tuple[Capture, Detections], ...]:
     """Runs towards one object, and what 'paper' finds.
 
-    Each run draws its ringing, and that decides: one run of few frames says as much as one of many. Over 60 of them
-    every number compared below lies at least five standard errors, by a bootstrap of runs, from where its test
-    would fail.
+    Each run draws its ringing, and that decides: a run of few frames says as much as one of many. Over 60 of them each
+    number compared below lies at least five standard errors, by a bootstrap of runs, from where its test would fail.
     """
     runs = captures(f"approach-{material}", channel, 60, **{"trajectory.speed_m_s": 2.4})
     return tuple((capture, found_by_paper(capture)) for capture in runs)

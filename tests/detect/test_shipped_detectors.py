@@ -129,17 +129,18 @@ def test_paper_leaves_nothing_out_where_sts_is_there():
     assert not any("left out" in note for note in whole_run("paper").notes)
 
 
-PUBLISHED = {5: {"width": 1.0, "prominence": 0.05, "snr": 20.0}, 9: {"width": 0.2, "prominence": 0.03, "snr": 10.0}}
+PUBLISHED = {
+    5: {"width.params.minimum": 1.0, "prominence.params.minimum": 0.05, "snr.params.minimum_db": 20.0},
+    9: {"width.params.minimum": 0.2, "prominence.params.minimum": 0.03, "snr.params.minimum_db": 10.0},
+}
 
 
 @pytest.mark.parametrize(("channel", "other"), [(5, 9), (9, 5)])
 def test_paper_takes_the_thresholds_of_the_captures_channel(channel, other):
     def ranges_m(thresholds):
-        keys = {
-            f"pipeline.filter.{name}.params.minimum{'_db' * (name == 'snr')}": thresholds[name] for name in thresholds
-        }
-        every = {"pipeline.select.strongest.use": "select.all"}
-        return load_detector("paper", changes=every | keys).run(plate(channel=channel, material="plywood")).range_m
+        changes = {f"pipeline.filter.{key}": value for key, value in thresholds.items()}
+        changes["pipeline.select.strongest.use"] = "select.all"
+        return load_detector("paper", changes=changes).run(plate(channel=channel, material="plywood")).range_m
 
     np.testing.assert_array_equal(ranges_m({}), ranges_m(PUBLISHED[channel]))
     assert len(ranges_m({})) != len(ranges_m(PUBLISHED[other]))  # 5 to 200 and 30 to 200 of them, 10 more for channel 9

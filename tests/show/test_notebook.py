@@ -1,6 +1,7 @@
 """What a notebook shows: hooks are called as Jupyter calls them, and the markup is read back by a parser."""
 
 import dataclasses
+import re
 import sys
 from html.parser import HTMLParser
 
@@ -10,7 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import uwbbench
-from uwbbench.api import Capture, Detections, Obstacle, Truth
+from uwbbench.api import Capture, Detections, Obstacle, Truth, load_plugin
+from uwbbench.api.locate import shipped
 from uwbbench.api.text import one_line
 from uwbbench.detect.pipeline import detector_from_yaml
 from uwbbench.show.notebook import elements
@@ -202,7 +204,7 @@ def test_a_detector_shows_its_chain_with_parameters_and_what_is_optional():
 
 def test_a_step_that_was_put_in_says_for_what():
     found = detector_from_yaml("{schema: 1, name: short, pipeline: [{use: peaks}]}")
-    assert "put in for peaks" in shown(found).text
+    assert "inserted for peaks" in shown(found).text
 
 
 def test_names_are_escaped_and_cut(approach):
@@ -222,6 +224,14 @@ def test_names_are_escaped_and_cut(approach):
 def test_any_text_reads_back_as_one_line_of_itself(value):
     read = _Markup(f"<p>{elements.text(value)}</p>").text
     assert read.split() == one_line(value, elements.LONGEST).split()
+
+
+def test_nothing_shows_the_markup_of_docstrings(approach, found):
+    detectors = [uwbbench.load_detector(name) for name in shipped("detectors")]
+    uses = {step.use for detector in detectors for step in detector.config.steps}
+    assert any("`" in (load_plugin("stages", use).__doc__ or "").partition("\n")[0] for use in uses)
+    for thing in (approach, approach.header, approach.truth, found, uwbbench.score(found, approach), *detectors):
+        assert not re.search(r"`|:\w+:|\*\*|\n[-=]{3}", shown(thing).text), thing
 
 
 def test_a_picture_needs_no_matplotlib(approach, monkeypatch):

@@ -37,24 +37,24 @@ def convert(
         raise ConfigError(f"{source}: no capture '{capture}'.{nearest(capture, names)}")
     runs: dict[str, list[Capture]] = {}
     for name in [capture] if capture is not None else names:
-        found = opened.open(name)
-        runs.setdefault(_run_of(name, found), []).append(found)
+        recorded = opened.open(name)
+        runs.setdefault(_run_of(name, recorded), []).append(recorded)
     for run, captures in runs.items():
         path = output if len(runs) == 1 else output.with_name(f"{output.stem}-{_file_part(run)}{output.suffix}")
         if len(captures) > 1:
-            captures = [replace(found, name=run or path.stem) for found in captures]
+            captures = [replace(recorded, name=run or path.stem) for recorded in captures]
         write_capture(path, *captures)
-        for found in captures:
-            label = "simulated capture" if found.source == "simulated" else "capture"
-            size = f"{len(found)} frames of {found.radar.taps} taps"
-            receiver = f", receiver '{found.radar.receiver}'" if len(captures) > 1 else ""
-            typer.echo(f"{label} '{found.name}'{receiver}, {size}, written to {path}", err=True)
+        for recorded in captures:
+            label = "simulated capture" if recorded.source == "simulated" else "capture"
+            size = f"{len(recorded)} frames of {recorded.radar.taps} taps"
+            receiver = f", receiver '{recorded.radar.receiver}'" if len(captures) > 1 else ""
+            typer.echo(f"{label} '{recorded.name}'{receiver}, {size}, written to {path}", err=True)
 
 
-def _run_of(name: str, found: Capture) -> str:
+def _run_of(name: str, capture: Capture) -> str:
     """What the captures of one run, which share a file, have in common: their names without the receiver."""
     run, _, last = name.rpartition("/")
-    return run if last == found.radar.receiver else name
+    return run if last == capture.radar.receiver else name
 
 
 def _file_part(name: str) -> str:
@@ -81,7 +81,7 @@ def _open(source: Path, name: str, settings: list[str] | None) -> Dataset[Any]:
             params.setdefault("files", [source.name])
         elif source.name not in [file.path for file in adapter.card.files]:
             raise ConfigError(
-                f"{source}: dataset '{name}' is not told its file, only its folder; give the folder, "
+                f"{source}: dataset '{name}' takes a folder, and no file; give the folder, "
                 f"and --set for other file names (see 'uwbbench show {name}')"
             )
     return open_dataset(name, params, [folder])
@@ -96,10 +96,10 @@ def fetch(
     """Download a published dataset. It is checked against its hashes."""
     import uwbbench.tools.fetch
 
-    def tell(file: Any, done: int, count: int) -> None:
+    def report_file(file: Any, done: int, count: int) -> None:
         typer.echo(f"{done + 1}/{count} {file.path}", err=True)
 
-    typer.echo(uwbbench.tools.fetch.fetch(dataset, folder, tell))
+    typer.echo(uwbbench.tools.fetch.fetch(dataset, folder, report_file))
 
 
 def register(app: typer.Typer) -> None:

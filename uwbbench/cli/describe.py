@@ -16,24 +16,24 @@ _CLASSES = ("stages", "datasets", "metrics", "terms")
 
 
 def everything_named(name: str) -> dict[str, dict[str, Any]]:
-    """Facts about each kind of thing that bears a name.
+    """Facts about each plugin and detector of that name.
 
     Raises
     ------
     PluginError, ConfigError
-        If nothing bears it, or it cannot be loaded.
+        If there is none, or it cannot be loaded.
     """
-    found: dict[str, dict[str, Any]] = {}
+    facts: dict[str, dict[str, Any]] = {}
     for kind in _CLASSES:
         if name in registry.entries(kind):
-            found[kind[:-1]] = _plugin(kind, name)
+            facts[kind[:-1]] = _plugin(kind, name)
     is_file = name.endswith((".yaml", ".yml"))
     if is_file or name in shipped("detectors") or name in registry.entries("detectors"):
-        found["detector"] = _detector(name)
-    if not found:
+        facts["detector"] = _detector(name)
+    if not facts:
         known = [*shipped("detectors"), *(known for kind in registry.KINDS for known in registry.entries(kind))]
         raise PluginError(f"no stage, detector, dataset, metric or term named '{name}'.{nearest(name, known)}")
-    return found
+    return facts
 
 
 def _plugin(kind: Any, name: str) -> dict[str, Any]:
@@ -74,7 +74,11 @@ def parameters(model: Any) -> list[dict[str, Any]]:
     rows = []
     for name, field in schema.get("properties", {}).items():
         required = name in schema.get("required", ())
-        default = "required" if required else _yaml_value(field.get("default", model.model_fields[name].default))
+        default = (
+            "required"
+            if required
+            else _yaml_value(field.get("default", model.model_fields[name].get_default(call_default_factory=True)))
+        )
         row = {"name": name, "type": _type_text(field, schema.get("$defs", {})), "default": default}
         rows.append({**row, "description": without_markup(field.get("description", ""))})
     return rows
@@ -164,17 +168,17 @@ def capture_file(path: Path) -> dict[str, Any]:
     truth = None
     if first.truth is not None:
         keys = ("name", "material", "structure", "moves")
-        objects = [{key: getattr(thing, key) for key in keys} for thing in first.truth.objects]
+        objects = [{key: getattr(obstacle, key) for key in keys} for obstacle in first.truth.objects]
         truth = {"exhaustive": first.truth.exhaustive, "objects": objects}
     about = {key: getattr(first, key) for key in ("name", "source", "license", "citation", "description")}
-    found = {
+    facts = {
         **about,
         "file": str(path),
         "radar": {**{key: radar[key] for key in common}, "text": text},
         "receivers": [_receiver(capture) for capture in captures],
         "truth": truth,
     }
-    return dict(plain(found))
+    return dict(plain(facts))
 
 
 def _receiver(capture: Any) -> dict[str, Any]:
@@ -259,7 +263,7 @@ def _extends_experiment(path: Path, keys: dict[str, Any]) -> bool:
     if not isinstance(parent, str):
         return False
     try:
-        found = find_config("experiments", parent, path.parent)
+        experiment = find_config("experiments", parent, path.parent)
     except ConfigError:
         return False
-    return "detectors" in read_yaml(found).data
+    return "detectors" in read_yaml(experiment).data

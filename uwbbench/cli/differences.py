@@ -21,18 +21,21 @@ if TYPE_CHECKING:
 LONGEST_VALUE = 100
 
 
-def print_comparison(found: Comparison, most: int) -> None:
+def print_comparison(comparison: Comparison, most: int) -> None:
     """Print a comparison for people."""
-    typer.echo(f"A: {found.first.path}\nB: {found.second.path}\n")
-    _changes(found)
-    _scores(found)
-    _times(found)
-    _flips(found, most)
-    render.print_notes(found.notes)
+    typer.echo(f"A: {comparison.first.path}\nB: {comparison.second.path}\n")
+    _changes(comparison)
+    _scores(comparison)
+    _times(comparison)
+    _flips(comparison, most)
+    render.print_notes(comparison.notes)
 
 
-def _changes(found: Comparison) -> None:
-    rows = [(one.kind, _value(one.where), _value(one.before), _value(one.after)) for one in found.changes]
+def _changes(comparison: Comparison) -> None:
+    rows = [
+        (change.kind, _value(change.where), _value(change.before), _value(change.after))
+        for change in comparison.changes
+    ]
     if rows:
         render.print_table("What went in", ("of", "what", "A", "B"), rows)
     else:
@@ -48,40 +51,40 @@ def _value(value: Any) -> str:
     return printable(text, LONGEST_VALUE)
 
 
-def _scores(found: Comparison) -> None:
+def _scores(comparison: Comparison) -> None:
     rows = []
-    for one in found.changed_scores:
-        dataset, source, scoring, table = one.board
-        by, d = Quantity.of(one.metric, found.metrics[one.metric]), one.difference
+    for change in comparison.changed_scores:
+        dataset, source, scoring, table = change.board
+        by, d = Quantity.of(change.metric, comparison.metrics[change.metric]), change.difference
         rows.append(
             (
                 f"{shown(dataset)}, {source.upper()}",
                 f"{scoring}, {table}",
-                shown(one.detector),
+                shown(change.detector),
                 by.axis,
-                number(one.before, by.digits, by.factor),
-                number(one.after, by.digits, by.factor),
+                number(change.before, by.digits, by.factor),
+                number(change.after, by.digits, by.factor),
                 interval(d.value, d.low, d.high, by.digits, by.factor),
-                number(one.adjusted, 3),
-                f"{one.captures} captures, {d.groups} groups",
+                number(change.adjusted, 3),
+                f"{change.captures} captures, {d.groups} groups",
             )
         )
     if rows:
         columns = ("dataset", "scoring", "detector", "metric", "A", "B", "B - A", "adjusted p", "n")
         render.print_table("What came out", columns, rows)
     else:
-        typer.echo(f"What came out: no score differs ({len(found.scores)} compared)")
+        typer.echo(f"What came out: no score differs ({len(comparison.scores)} compared)")
 
 
-def _times(found: Comparison) -> None:
+def _times(comparison: Comparison) -> None:
     rows = [
         (
-            shown(one.dataset),
-            shown(one.detector),
-            *(interval(side.ratio, side.low, side.high, 2) for side in (one.before, one.after)),
-            interval(one.factor, one.low, one.high, 2),
+            shown(change.dataset),
+            shown(change.detector),
+            *(interval(side.ratio, side.low, side.high, 2) for side in (change.before, change.after)),
+            interval(change.factor, change.low, change.high, 2),
         )
-        for one in found.times
+        for change in comparison.times
     ]
     if rows:
         columns = ("dataset", "detector", "A", "B", "B / A")
@@ -89,13 +92,13 @@ def _times(found: Comparison) -> None:
         typer.echo("  Intervals hold inside one run; runs of the same code have differed by 10 %.\n")
 
 
-def _flips(found: Comparison, most: int) -> None:
+def _flips(comparison: Comparison, most: int) -> None:
     rows = [
         (shown(detector), before, after, str(count))
-        for detector, counter in found.flip_counts.items()
+        for detector, counter in comparison.flip_counts.items()
         for (before, after), count in counter.most_common()
     ]
-    title = f"Frames that flipped ({found.scoring} scoring, of {found.compared_frames} compared)"
+    title = f"Frames that flipped ({comparison.scoring} scoring, of {comparison.compared_frames} compared)"
     if not rows:
         typer.echo(f"{title}: none")
         return
@@ -103,27 +106,43 @@ def _flips(found: Comparison, most: int) -> None:
     render.print_table("", ("detector", "A", "B", "frames"), rows)
     if most:
         columns = ("detector", "dataset", "capture", "frame", "time (s)", "A", "B", "error A (cm)", "error B (cm)")
-        render.print_table("The worst first", columns, list(_worst(found, most)))
+        render.print_table("The worst first", columns, list(_worst(comparison, most)))
 
 
-def _worst(found: Comparison, most: int) -> Iterator[tuple[str, ...]]:
-    for one in found.worst[:most]:
-        names = (shown(one.unit.detector), shown(one.unit.dataset), shown(one.unit.capture))
-        errors = [number(value, 1, 100) for value in (one.error_before_m, one.error_after_m)]
-        yield (*names, str(one.frame), f"{one.time_s:.2f}", one.before, one.after, *errors)
+def _worst(comparison: Comparison, most: int) -> Iterator[tuple[str, ...]]:
+    for flip in comparison.worst[:most]:
+        names = (shown(flip.unit.detector), shown(flip.unit.dataset), shown(flip.unit.capture))
+        errors = [number(value, 1, 100) for value in (flip.error_before_m, flip.error_after_m)]
+        yield (*names, str(flip.frame), f"{flip.time_s:.2f}", flip.before, flip.after, *errors)
 
 
-def draw_worst(found: Comparison, target: Path, data_dir: Path | None) -> None:
-    """Draw the worst flipped frame into a file."""
+def draw_worst(comparison: Comparison, target: Path, data_dir: Path | None) -> None:
+    """Draw the worst flipped frame into a file, and print where it is; without a flip, print that there is none.
+
+    Parameters
+    ----------
+    comparison : Comparison
+    target : Path
+        Picture; its suffix decides the format.
+    data_dir : Path or None
+        Folder in which captures are looked for first, to draw their samples.
+
+    Raises
+    ------
+    StoreError
+        If the file cannot be written.
+    UwbbenchError
+        If matplotlib is not installed.
+    """
     from uwbbench.config.source import data_roots
     from uwbbench.show.figures import style
     from uwbbench.show.figures.flip import draw_flip
 
-    if not found.worst:
+    if not comparison.worst:
         typer.echo("note: no frame flipped, so there is no picture", err=True)
         return
-    rule = next(rule for rule in found.first.rules if rule.scoring == found.scoring)
-    drawn, missing = draw_flip(found.worst[0], rule.region, data_roots(data_dir))
+    rule = next(rule for rule in comparison.first.rules if rule.scoring == comparison.scoring)
+    drawn, missing = draw_flip(comparison.worst[0], rule.region, data_roots(data_dir))
     style.save(drawn, target)
     render.print_notes([missing] if missing else [])
     typer.echo(f"picture written to {target}", err=True)

@@ -1,4 +1,4 @@
-"""Commands that put one detector on one capture: ``score``, ``detect``, ``calibrate``."""
+"""Commands that run one detector on one capture: ``score``, ``detect``, ``calibrate``."""
 
 from __future__ import annotations
 
@@ -32,14 +32,14 @@ def score(
     from uwbbench.measure.accuracy.scoring import ScoringRules
     from uwbbench.run.folder.identity import plain
 
-    ScoringRules(scoring.value, gate_m)  # a wrong gate is found before the detector has run
+    ScoringRules(scoring.value, gate_m)  # refuses a wrong gate before the detector has run
     opened, pipeline = _open(capture, receiver, detector, settings)
     if opened.truth is None:
         raise ScoringError(f"{capture}: the capture has no ground truth; it can be detected on, but not scored")
-    found = pipeline.run(opened, candidates=scoring is options.Scoring.PEAK)
-    invalid = len(opened) - len(found.processed)
+    detections = pipeline.run(opened, candidates=scoring is options.Scoring.PEAK)
+    invalid = len(opened) - len(detections.processed)
     notes = [f"{invalid} of {len(opened)} frames are invalid (a sample is not finite): not scored"] if invalid else []
-    tables = uwbbench.score(found, opened, scoring=scoring.value, gate_m=gate_m).to_dict()
+    tables = uwbbench.score(detections, opened, scoring=scoring.value, gate_m=gate_m).to_dict()
     result = {
         "detector": pipeline.name,
         "capture": opened.name,
@@ -52,7 +52,7 @@ def score(
         "receiver": opened.radar.receiver,
         "source": opened.source,
         "invalid_frames": invalid,
-        "notes": [*notes, *found.notes],
+        "notes": [*notes, *detections.notes],
     }
     if json:
         render.print_json(plain(result))
@@ -94,17 +94,17 @@ def detect(
 
     suffix = options.format_of(output, ".csv", ".parquet")
     opened, pipeline = _open(capture, receiver, detector, settings)
-    found = pipeline.run(opened)
-    table = found.to_pandas().sort_values("frame", kind="stable")  # clustering hands some out later than others
+    detections = pipeline.run(opened)
+    table = detections.to_pandas().sort_values("frame", kind="stable")  # clustering hands some out later than others
     with replacing(output) as partial:
         if suffix == ".csv":
             table.to_csv(partial, index=False)
         else:
             table.to_parquet(partial, index=False)
     label = "SIMULATED capture" if opened.source == "simulated" else "capture"
-    counts = f"{len(found)} detections in {len(found.processed)} of {len(opened)} frames"
+    counts = f"{len(detections)} detections in {len(detections.processed)} of {len(opened)} frames"
     typer.echo(f"{pipeline.name} on {label} '{opened.name}': {counts}, written to {output}", err=True)
-    render.print_notes(found.notes)
+    render.print_notes(detections.notes)
 
 
 def calibrate(
@@ -131,10 +131,10 @@ def calibrate(
     changes = parse_settings(settings or ()) | measured.as_settings()
     head = {"schema": 1, "extends": _seen_from(output.parent, detector), "name": name, "set": changes}
     label = "SIMULATED capture" if opened.source == "simulated" else "capture"
-    found = f"range offset {measured.range_bias_m:+.4f} m"
+    offsets = f"range offset {measured.range_bias_m:+.4f} m"
     if measured.azimuth_bias_rad is not None:
-        found += f", azimuth offset {math.degrees(measured.azimuth_bias_rad):+.2f} degrees"
-    origin = f"measured on {label} '{opened.name}' from {measured.n} detections: {found}"
+        offsets += f", azimuth offset {math.degrees(measured.azimuth_bias_rad):+.2f} degrees"
+    origin = f"measured on {label} '{opened.name}' from {measured.n} detections: {offsets}"
     write_text(output, f"# {origin}\n{yaml.safe_dump(head, sort_keys=False, allow_unicode=True)}")
     typer.echo(f"{origin}; detector '{name}' written to {output}", err=True)
 

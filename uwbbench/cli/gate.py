@@ -45,7 +45,7 @@ def gate(
     summary = summary or (Path(os.environ[STEP_SUMMARY]) if os.environ.get(STEP_SUMMARY) else None)
     for target in (junit, summary):
         if target is not None and not target.absolute().parent.is_dir():
-            raise StoreError(f"{target}: no folder to write it into")  # found before, not after, the work is done
+            raise StoreError(f"{target}: no folder to write it into")  # before the work, not after it
     result = run_gate(checked, (lambda _: None) if quiet else (lambda text: typer.echo(text, err=True)))
     if junit is not None:
         write_text(junit, publish.junit(result))

@@ -42,11 +42,11 @@ def list_names(
     """List what is installed. Nothing of it is loaded."""
     from uwbbench.api import registry
 
-    found = {name: _listed(name) for name in ([kind.value] if kind else registry.KINDS)}
+    listed = {name: _listed(name) for name in ([kind.value] if kind else registry.KINDS)}
     if json:
-        render.print_json(found)
+        render.print_json(listed)
         return
-    for name, rows in found.items():
+    for name, rows in listed.items():
         problems = ["problem"] if any(row["problem"] for row in rows) else []
         shown = ["name", "package", "target", *problems]
         render.print_table(name, shown, [[row[column] for column in shown] for row in rows])
@@ -73,11 +73,11 @@ def show(
     """Explain a plugin, or print a detector as YAML."""
     from uwbbench.cli import describe
 
-    found = describe.everything_named(name)
+    facts_by_kind = describe.everything_named(name)
     if json:
-        render.print_json(found)
+        render.print_json(facts_by_kind)
         return
-    for kind, facts in found.items():
+    for kind, facts in facts_by_kind.items():
         if kind == "detector":
             typer.echo(describe.detector_yaml(facts), nl=False)
             continue
@@ -94,22 +94,22 @@ def show(
 
 
 def info(capture: options.CaptureFile, json: options.Json = False) -> None:
-    """Tell what a capture file holds."""
+    """Print what a capture file holds."""
     from uwbbench.cli import describe
 
-    found = describe.capture_file(capture)
+    content = describe.capture_file(capture)
     if json:
-        render.print_json(found)
+        render.print_json(content)
         return
-    label = "SIMULATED" if found["source"] == "simulated" else found["source"]
-    about = {key: found[key] for key in ("name", "description", "license", "citation")}
-    render.print_facts({"capture": about.pop("name"), "source": label, **about, "radar": found["radar"]["text"]})
+    label = "SIMULATED" if content["source"] == "simulated" else content["source"]
+    about = {key: content[key] for key in ("name", "description", "license", "citation")}
+    render.print_facts({"capture": about.pop("name"), "source": label, **about, "radar": content["radar"]["text"]})
     rows = []
-    for receiver in found["receivers"]:
+    for receiver in content["receivers"]:
         facts = describe.receiver_text(receiver)
         rows.append(list(facts.values()))
     render.print_table("receivers", list(facts), rows)
-    truth = found["truth"]
+    truth = content["truth"]
     if truth is None:
         typer.echo("no ground truth: detectors can run on it, but it cannot be scored")
         return
@@ -119,9 +119,9 @@ def info(capture: options.CaptureFile, json: options.Json = False) -> None:
     render.print_table("objects", ("name", "material", "kind"), objects)
 
 
-def _object_text(thing: dict[str, Any]) -> str:
-    what = "structure" if thing["structure"] else "obstacle"
-    return f"moving {what}" if thing["moves"] else what
+def _object_text(obstacle: dict[str, Any]) -> str:
+    what = "structure" if obstacle["structure"] else "obstacle"
+    return f"moving {what}" if obstacle["moves"] else what
 
 
 def validate(
@@ -160,14 +160,14 @@ def schema(
         File.GATE: gate_schema,
         File.TUNING: tuning_schema,
     }
-    made = makers[file]()
+    document = makers[file]()
     if output is None:
-        render.print_json(made)
+        render.print_json(document)
         return
     options.format_of(output, ".json")
     from uwbbench.run.folder.files import write_json
 
-    write_json(output, made)
+    write_json(output, document)
     typer.echo(f"{file.value} schema written to {output}")
 
 
@@ -177,16 +177,16 @@ def version(json: options.Json = False) -> None:
     from importlib.metadata import PackageNotFoundError
     from importlib.metadata import version as installed
 
-    found = {"uwbbench": uwbbench.__version__, "python": platform.python_version(), "platform": platform.platform()}
+    versions = {"uwbbench": uwbbench.__version__, "python": platform.python_version(), "platform": platform.platform()}
     for name in ("numpy", "scipy", "scikit-learn", "pandas", "h5py", "pyarrow"):
         try:
-            found[name] = installed(name)
+            versions[name] = installed(name)
         except PackageNotFoundError:
-            found[name] = "not installed"
+            versions[name] = "not installed"
     if json:
-        render.print_json(found)
+        render.print_json(versions)
     else:
-        for name, text in found.items():
+        for name, text in versions.items():
             typer.echo(f"{name} {text}")
 
 

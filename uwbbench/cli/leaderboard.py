@@ -29,29 +29,31 @@ def leaderboard(
     ] = None,
     json: options.Json = False,
 ) -> None:
-    """Put runs of several machines together: a table, or a site.
+    """Combine runs of several machines: a table, or a site.
 
     Every run is verified first; if something in one does not hold, nothing is written and the exit code is 1. Runs are
     compared where experiment, content of captures and scoring rules agree; times only as ratios to the common
     reference detector.
     """
     from uwbbench.results.leaderboard import Unverified
-    from uwbbench.tools.leaderboard import leaderboard as put_together
+    from uwbbench.tools.leaderboard import leaderboard as combine
 
     try:
-        made = put_together(runs, output, progress=_progress)
+        combined = combine(runs, output, progress=_progress)
     except Unverified as error:
         if json:
             render.print_json({"problems": error.problems})
         typer.echo(f"error: {error}", err=True)
         raise typer.Exit(CHECK_FAILED) from error
     if output is not None:
-        typer.echo(f"site written to {output}: {len(made.files)} files, start with {output / 'index.html'}", err=True)
+        typer.echo(
+            f"site written to {output}: {len(combined.files)} files, start with {output / 'index.html'}", err=True
+        )
     if json:
-        render.print_json(made.to_dict())
+        render.print_json(combined.to_dict())
         return
     if output is None:
-        content = made.content
+        content = combined.content
         for section in content.sections:
             board = content.board(section.main)
             title = f"{content.names.suite(section.suite)}: {section.title}, {board.title}"
@@ -82,24 +84,24 @@ def verify(runs: RunPaths, json: options.Json = False) -> None:
     from uwbbench.run.folder.verify import verify as check
 
     folders = [RunFolder(path) for path in runs]
-    found = {}
+    verifications = {}
     for folder in folders:
         _progress(f"verifying {folder.path}")
-        found[str(folder.path)] = check(folder)
+        verifications[str(folder.path)] = check(folder)
     if json:
         facts = {
-            path: {"passed": one.passed, "checked": one.checked, "problems": one.problems, "notes": one.notes}
-            for path, one in found.items()
+            path: {key: getattr(verification, key) for key in ("passed", "checked", "problems", "notes")}
+            for path, verification in verifications.items()
         }
         render.print_json(facts)
     else:
-        for path, one in found.items():
-            counts = ", ".join(f"{count} {what}" for what, count in one.checked.items())
-            typer.echo(f"{path}: {'verified' if one.passed else 'DOES NOT HOLD'} ({counts})")
-            for problem in one.problems:
+        for path, verification in verifications.items():
+            counts = ", ".join(f"{count} {what}" for what, count in verification.checked.items())
+            typer.echo(f"{path}: {'verified' if verification.passed else 'DOES NOT HOLD'} ({counts})")
+            for problem in verification.problems:
                 typer.echo(f"  {problem}")
-            render.print_notes(one.notes)
-    if not all(one.passed for one in found.values()):
+            render.print_notes(verification.notes)
+    if not all(verification.passed for verification in verifications.values()):
         raise typer.Exit(CHECK_FAILED)
 
 
@@ -132,14 +134,16 @@ def diff(
 
     if figure is not None:
         options.format_of(figure, ".png", ".svg", ".pdf")
-    found = compare(RunFolder(first), RunFolder(second), None if scoring is None else scoring.value, max(frames, 1))
+    comparison = compare(
+        RunFolder(first), RunFolder(second), None if scoring is None else scoring.value, max(frames, 1)
+    )
     if json:
-        render.print_json(plain(found.to_dict()))
+        render.print_json(plain(comparison.to_dict()))
     else:
-        differences.print_comparison(found, frames)
+        differences.print_comparison(comparison, frames)
     if figure is not None:
-        differences.draw_worst(found, figure, data_dir)
-    if exit_code and found.differs:
+        differences.draw_worst(comparison, figure, data_dir)
+    if exit_code and comparison.differs:
         raise typer.Exit(CHECK_FAILED)
 
 

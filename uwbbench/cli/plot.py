@@ -57,15 +57,15 @@ def plot(
     check_kind(kind, choices)
     target = output or Path(f"{source.resolve().stem}-{kind}.png")
     options.format_of(target, ".png", ".svg", ".pdf")
-    with style.styled():  # a missing matplotlib is found before a detector has run
+    with style.styled():  # refuses before a detector has run, where matplotlib is missing
         pass
     if source.is_dir():
         _refuse({"--receiver": receiver, "--set": settings}, f"is for a capture file; {source} is a run folder")
-        made = draw_run(kind, RunFolder(source), choices, detector, capture, dataset)
+        drawn = draw_run(kind, RunFolder(source), choices, detector, capture, dataset)
     else:
         _refuse({"--capture": capture, "--dataset": dataset}, f"chooses from a run folder; {source} is none")
-        made = _of_capture(kind, source, choices, detector, receiver, settings)
-    style.save(made, target)
+        drawn = _of_capture(kind, source, choices, detector, receiver, settings)
+    style.save(drawn, target)
     typer.echo(f"{kind} written to {target}", err=True)
 
 

@@ -25,7 +25,15 @@ def print_json(value: Any) -> None:
 
 
 def print_table(title: str, columns: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
-    """Print a table on stdout; cells are shown as they are, whatever they hold."""
+    """Print a table on stdout.
+
+    Parameters
+    ----------
+    title : str
+    columns : sequence of str
+    rows : iterable of sequence of object
+        As many cells as columns in each; shown as they are, whatever they hold.
+    """
     from rich import box
     from rich.console import Console
     from rich.markup import escape

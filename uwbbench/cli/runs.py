@@ -121,19 +121,19 @@ def report(
     chosen = _format_of(output, form, json=json)
     roots = data_roots(data_dir)
     with read_safely(run):
-        made = Report(RunFolder(run))
+        run_report = Report(RunFolder(run))
         if chosen is None and figures is None:
-            render.print_report(made)
+            render.print_report(run_report)
         if figures is not None:
-            drawn = written.write_figures(made, figures, roots, force=force)
+            drawn = written.write_figures(run_report, figures, roots, force=force)
             typer.echo(f"{len(drawn)} figures written to {figures}", err=True)
         if chosen is not None and output is not None:
-            written.write(made, output, chosen, roots, force=force)
+            written.write(run_report, output, chosen, roots, force=force)
             typer.echo(f"report written to {output}", err=True)
         elif chosen is Format.JSON:
-            render.print_json(formats.as_json(made))
+            render.print_json(formats.as_json(run_report))
         elif chosen is not None:
-            typer.echo(written.as_text(made, chosen, roots), nl=False)
+            typer.echo(written.as_text(run_report, chosen, roots), nl=False)
 
 
 def _format_of(output: Path | None, form: Format | None, *, json: bool) -> Format | None:
@@ -184,13 +184,13 @@ def _conclude(folder: RunFolder, data_dir: Path | None, *, json: bool) -> None:
     from uwbbench.show.text import formats
 
     with read_safely(folder.path):
-        made = Report(folder)
-        path, missing = written.write_into_run(made, data_roots(data_dir))
+        run_report = Report(folder)
+        path, missing = written.write_into_run(run_report, data_roots(data_dir))
         render.print_notes([missing] if missing else [])
         if json:
-            render.print_json(formats.as_json(made))
+            render.print_json(formats.as_json(run_report))
             return
-        render.print_leaderboard(made)
+        render.print_leaderboard(run_report)
     typer.echo(f"run folder: {folder.path} (all tables: {path}, or 'uwbbench report {folder.path}')")
 
 

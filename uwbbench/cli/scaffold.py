@@ -1,4 +1,4 @@
-"""Commands for authors of plugins: ``new`` writes a package, ``check`` puts conformance checks to a plugin."""
+"""Commands for authors of plugins: ``new`` writes a package, ``check`` runs conformance checks on a plugin."""
 
 from __future__ import annotations
 
@@ -87,13 +87,13 @@ def check(
         raise typer.BadParameter("name a plugin to check, or ask for --list")
     params = parse_settings(settings or ())
     with contextlib.redirect_stdout(sys.stderr):  # what a plugin prints must not spoil the output
-        found = [examine(subject_of(one, name, params, data_roots(data_dir)), only or None) for one in kinds]
+        outcomes = [examine(subject_of(one, name, params, data_roots(data_dir)), only or None) for one in kinds]
     if json:
-        render.print_json([one.to_dict() for one in found])
+        render.print_json([one.to_dict() for one in outcomes])
     else:
-        for one in found:
+        for one in outcomes:
             _print(one, traceback=traceback)
-    if not all(one.passed for one in found):
+    if not all(one.passed for one in outcomes):
         raise typer.Exit(CHECK_FAILED)
 
 
@@ -111,16 +111,16 @@ def _list(kinds: Iterable[AuthoredKind], *, json: bool) -> None:
         render.print_table(f"checks of a {kind}", columns[:2], [row[:2] for row in rows])
 
 
-def _print(found: Conformance, *, traceback: bool) -> None:
-    rows = [(one.check.name, one.status, one.detail or one.found) for one in found.results]
-    render.print_table(f"{found.kind} {found.name}", ("check", "outcome", "detail"), rows)
-    for one in found.results:
+def _print(conformance: Conformance, *, traceback: bool) -> None:
+    rows = [(one.check.name, one.status, one.detail or one.found) for one in conformance.results]
+    render.print_table(f"{conformance.kind} {conformance.name}", ("check", "outcome", "detail"), rows)
+    for one in conformance.results:
         if not one.passed:
             typer.echo(f"{one.explain()}\n")
             if traceback and one.trace:
                 typer.echo(one.trace)
-    counts = [f"{found.count(status)} {status}" for status in ("passed", "failed", "error", "not applicable")]
-    typer.echo(f"{found.kind} '{found.name}': {', '.join(counts)}")
+    counts = [f"{conformance.count(status)} {status}" for status in ("passed", "failed", "error", "not applicable")]
+    typer.echo(f"{conformance.kind} '{conformance.name}': {', '.join(counts)}")
 
 
 def register(app: typer.Typer) -> None:

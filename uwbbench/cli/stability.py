@@ -1,4 +1,4 @@
-"""The command that puts hard cases to a detector: ``stability``."""
+"""The command that runs the hard cases on a detector: ``stability``."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def stability(
     settings: options.Settings = None,
     json: options.Json = False,
 ) -> None:
-    """Put hard cases to a detector.
+    """Run the hard cases on a detector.
 
     Inputs at which numerical code breaks, each with the behaviour that is expected. Exits with 1 if a case fails.
     """
@@ -31,28 +31,31 @@ def stability(
     from uwbbench.measure.robustness import case_named, examine
 
     chosen = [case_named(name) for name in case] if case else None
-    found = examine(uwbbench.load_detector(detector, changes=parse_settings(settings or ())), chosen)
+    outcome = examine(uwbbench.load_detector(detector, changes=parse_settings(settings or ())), chosen)
     if json:
-        render.print_json(found.to_dict())
+        render.print_json(outcome.to_dict())
     else:
-        _print(found)
-    if not found.passed:
+        _print(outcome)
+    if not outcome.passed:
         raise typer.Exit(CHECK_FAILED)
 
 
-def _print(found: Stability) -> None:
-    rows = [(one.check.name, one.check.asked, one.status, one.detail or one.found) for one in found.results]
-    render.print_table(f"hard cases for {found.detector}", ("case", "expected", "outcome", "detail"), rows)
-    figures = found.summary()
+def _print(outcome: Stability) -> None:
+    rows = [
+        (result.check.name, result.check.asked, result.status, result.detail or result.found)
+        for result in outcome.results
+    ]
+    render.print_table(f"hard cases for {outcome.detector}", ("case", "expected", "outcome", "detail"), rows)
+    figures = outcome.summary()
     counts = f"{figures['passed']} passed, {figures['failed']} failed, {figures['not_applicable']} not applicable"
-    told = {
+    facts = {
         "cases": counts,
         "largest error": ", ".join(_small(figures[f"largest_error_{unit}"], unit) for unit in ("m", "ulp")),
         "echo found": f"in {figures['usual_hits']:.0%} of undisturbed frames",
         "changed by float32": _share(figures["flips_float32"]),
         "changed by one ulp": _share(figures["flips_one_ulp"]),
     }
-    render.print_facts(told)
+    render.print_facts(facts)
 
 
 def _small(value: float | None, unit: str) -> str:

@@ -70,15 +70,15 @@ def time(
         pipeline.open(opened)  # what cannot work on this capture is said before anything is timed
     asked = {"reference": reference, "frames": frames, "blocks": blocks, "paced_s": paced, "rate_hz": rate_hz}
     settings = LatencyModel.model_validate(asked)
-    found: list[tuple[str, Latency]] = []
+    latencies: list[tuple[str, Latency]] = []
     for pipeline in pipelines:
         typer.echo(f"timing {pipeline.name} ...", err=True)
-        found.append((pipeline.name, measure(ref, pipeline.config, settings)))
+        latencies.append((pipeline.name, measure(ref, pipeline.config, settings)))
     about = {**asked, "capture": opened.name, "source": opened.source, "frames": min(frames, len(opened))}
     if json:
-        render.print_json({**about, "detectors": [_everything(*one) for one in found]})
+        render.print_json({**about, "detectors": [_everything(*one) for one in latencies]})
     else:
-        _print(about, found)
+        _print(about, latencies)
 
 
 def _open(text: str, receiver: str | None, data_dir: Path | None) -> tuple[CaptureRef, Capture]:
@@ -104,12 +104,12 @@ def _everything(name: str, latency: Latency) -> dict[str, Any]:
     return {"detector": name, **latency.to_dict(), **calls}
 
 
-def _print(about: dict[str, Any], found: Sequence[tuple[str, Latency]]) -> None:
+def _print(about: dict[str, Any], latencies: Sequence[tuple[str, Latency]]) -> None:
     """Ratios first, as they travel; then the times of this machine, and how far the measurement can be trusted."""
     label = "SIMULATED capture" if about["source"] == "simulated" else "capture"
     typer.echo(f"{label} '{about['capture']}', {about['frames']} frames, one frame a call")
-    names = [name for name, _ in found]
-    all_latencies = [latency for _, latency in found]
+    names = [name for name, _ in latencies]
+    all_latencies = [latency for _, latency in latencies]
 
     def table(title: str, lines: Sequence[tuple[str, Callable[[Latency], str]]]) -> None:
         rows = [(text, *(cell(latency) for latency in all_latencies)) for text, cell in lines]
@@ -123,7 +123,7 @@ def _print(about: dict[str, Any], found: Sequence[tuple[str, Latency]]) -> None:
         paced = all_latencies[0].paced or {}
         table(f"at {paced['rate_hz']:g} Hz for {about['paced_s']:g} s, asleep in between, THIS MACHINE ONLY", _PACED)
     table("the measurement itself", _QUALITY)
-    for name, latency in found:
+    for name, latency in latencies:
         render.print_notes([f"{name}: {note}" for note in latency.notes])
 
 
@@ -132,8 +132,8 @@ def _reference(latency: Latency) -> dict[str, Any]:
 
 
 def _ratio(latency: Latency, name: str, low: str, high: str) -> str:
-    found = _reference(latency)
-    return f"{found[name]:.3g} [{found[low]:.3g}, {found[high]:.3g}]"
+    ratio = _reference(latency)
+    return f"{ratio[name]:.3g} [{ratio[low]:.3g}, {ratio[high]:.3g}]"
 
 
 def _blocks(ratio: dict[str, Any]) -> str:
@@ -146,7 +146,7 @@ def _us(value: float | None, reason: str = "too few calls") -> str:
 
 def _kind(kind: dict[str, Any] | None) -> str:
     if kind is None:
-        return "n/a (the detector does not tell)"
+        return "n/a (the detector does not report them)"
     if kind["n"] == 0:
         return "0 calls"
     tails = [f"p{q} {_us(kind[f'p{q}_us'])}" for q in (90, 95, 99) if kind[f"p{q}_us"] is not None]
@@ -155,8 +155,8 @@ def _kind(kind: dict[str, Any] | None) -> str:
 
 def _missed(counts: dict[str, Any]) -> str:
     """Missed deadlines with the upper bound of their share, and the longest burst where there is one."""
-    told = f"{counts['missed']} of {counts['n']}, at most {counts['missed_share_high']:.2%}"
-    return f"{told}, longest burst {counts['longest_burst']}" if counts["missed"] else told
+    share = f"{counts['missed']} of {counts['n']}, at most {counts['missed_share_high']:.2%}"
+    return f"{share}, longest burst {counts['longest_burst']}" if counts["missed"] else share
 
 
 def _share(us: float, share: float | None) -> str:
@@ -164,12 +164,12 @@ def _share(us: float, share: float | None) -> str:
 
 
 def _bytes(value: float | None) -> str:
-    return "n/a (not told by the system)" if value is None else f"{value / 1e3:+.1f} kB"
+    return "n/a (the system reports none)" if value is None else f"{value / 1e3:+.1f} kB"
 
 
 def _quality(latency: Latency, *names: str) -> str:
-    found = [latency.quality.get(name) for name in names]
-    return " / ".join("n/a" if value is None else f"{value:.4g}" for value in found)
+    values = [latency.quality.get(name) for name in names]
+    return " / ".join("n/a" if value is None else f"{value:.4g}" for value in values)
 
 
 def _in_pace(name: str) -> Callable[[Latency], str]:
@@ -181,8 +181,8 @@ def _share_in_pace(q: int) -> Callable[[Latency], str]:
 
 
 def _late_starts(latency: Latency) -> str:
-    found = latency.paced or {}
-    return f"{found['late_starts']}, p99 {_us(found['lateness_p99_us'])}, max {_us(found['lateness_max_us'])}"
+    paced = latency.paced or {}
+    return f"{paced['late_starts']}, p99 {_us(paced['lateness_p99_us'])}, max {_us(paced['lateness_max_us'])}"
 
 
 Lines = tuple[tuple[str, Callable[["Latency"], str]], ...]
@@ -236,7 +236,7 @@ _QUALITY: Lines = (
     ("page faults, minor / major", lambda one: _quality(one, "minor_faults", "major_faults")),
     ("core lost, waited", lambda one: _quality(one, "involuntary_switches", "voluntary_switches")),
     ("load before / after", lambda one: _quality(one, "load_before", "load_after")),
-    ("governor, turbo", lambda one: ", ".join(str(one.machine[key] or "not told") for key in ("governor", "turbo"))),
+    ("governor, turbo", lambda one: ", ".join(str(one.machine[key] or "unknown") for key in ("governor", "turbo"))),
 )
 
 

@@ -55,8 +55,8 @@ def tune(
     if figure is not None:
         _require_grid(tuning.sweep is not None)
     folder = new_folder(tuning.name, out)
-    with _progress(quiet) as tell:
-        outcome = run_tuning(tuning, tell)
+    with _progress(quiet) as report_progress:
+        outcome = run_tuning(tuning, report_progress)
     files = publish(outcome, folder)
     if figure is not None:
         _draw(outcome, figure)

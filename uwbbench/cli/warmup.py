@@ -56,13 +56,15 @@ def warmup(
         raise typer.Exit(UNITS_FAILED)
 
 
-def _line(one: Warmed) -> str:
-    if one.failure is not None:
-        return f"{one.detector}: failed: {one.failure}"
+def _line(warmed: Warmed) -> str:
+    if warmed.failure is not None:
+        return f"{warmed.detector}: failed: {warmed.failure}"
     counts = (
-        f"{one.compiled} compiled, {one.loaded} loaded" if one.compiled or one.loaded else "nothing more to compile"
+        f"{warmed.compiled} compiled, {warmed.loaded} loaded"
+        if warmed.compiled or warmed.loaded
+        else "nothing more to compile"
     )
-    return f"{one.detector}: {one.seconds:.1f} s, {counts}"
+    return f"{warmed.detector}: {warmed.seconds:.1f} s, {counts}"
 
 
 def register(app: typer.Typer) -> None:

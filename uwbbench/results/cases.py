@@ -152,9 +152,9 @@ def _case(folder: RunFolder, entries: Sequence[Entry], rule: ScoringRules, score
     since_s = header.trajectory.timestamp_s - header.trajectory.timestamp_s[:1]
     marks = []
     for entry in entries:
-        found = folder.detections(entry.unit)
-        scene = Scene.of(found, header)
-        marks.append(_marks(entry.detector, found, since_s, scene, rule))
+        detections = folder.detections(entry.unit)
+        scene = Scene.of(detections, header)
+        marks.append(_marks(entry.detector, detections, since_s, scene, rule))
     return Case(
         **about,
         capture_id=capture_id,
@@ -168,19 +168,19 @@ def _case(folder: RunFolder, entries: Sequence[Entry], rule: ScoringRules, score
     )
 
 
-def _marks(detector: str, found: Detections, since_s: FloatArray, scene: Scene, rule: ScoringRules) -> Marks:
-    rows = _thinned(len(found))
-    error_m = np.abs(scene.errors_m(found, "filtering"))
-    near = np.any((error_m <= rule.gate_m) & scene.visible(rule.region)[found.frame], axis=1)
+def _marks(detector: str, detections: Detections, since_s: FloatArray, scene: Scene, rule: ScoringRules) -> Marks:
+    rows = _thinned(len(detections))
+    error_m = np.abs(scene.errors_m(detections, "filtering"))
+    near = np.any((error_m <= rule.gate_m) & scene.visible(rule.region)[detections.frame], axis=1)
     none = np.full(len(rows), np.nan)
     return Marks(
         detector=detector,
-        time_s=since_s[found.frame[rows]],
-        range_m=found.range_m[rows] if "range_m" in found else none,
-        x_m=found["x_m"][rows] if "x_m" in found else none,
-        y_m=found["y_m"][rows] if "y_m" in found else none,
+        time_s=since_s[detections.frame[rows]],
+        range_m=detections.range_m[rows] if "range_m" in detections else none,
+        x_m=detections["x_m"][rows] if "x_m" in detections else none,
+        y_m=detections["y_m"][rows] if "y_m" in detections else none,
         near=near[rows],
-        count=len(found),
+        count=len(detections),
     )
 
 

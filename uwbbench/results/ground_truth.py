@@ -61,15 +61,15 @@ def outlines(header: CaptureHeader, frames: IntArray | None = None) -> list[Outl
     frames : (shown,) int array, optional
         Frames of the path of what moves; all by default.
     """
-    found = []
-    for thing in header.truth.objects if header.truth is not None else ():
-        points_m = thing.outline_m[..., :2]
-        if thing.moves:
+    shapes = []
+    for obstacle in header.truth.objects if header.truth is not None else ():
+        points_m = obstacle.outline_m[..., :2]
+        if obstacle.moves:
             points_m = (points_m if frames is None else points_m[frames]).mean(axis=1)
         else:
             points_m = points_m.reshape(-1, 2)
-        found.append(Outline(thing.name, thing.structure, thing.moves, points_m))
-    return found
+        shapes.append(Outline(obstacle.name, obstacle.structure, obstacle.moves, points_m))
+    return shapes
 
 
 def true_ranges(header: CaptureHeader, region: Region | None = None, frames: IntArray | None = None) -> list[TrueRange]:
@@ -90,7 +90,7 @@ def true_ranges(header: CaptureHeader, region: Region | None = None, frames: Int
     range_m = np.where(sight.occluded, np.nan, sight.range_m)
     shown = slice(None) if frames is None else frames
     return [
-        TrueRange(thing.name, range_m[shown, column], ahead[shown, column])
-        for column, thing in enumerate(header.truth.objects)
-        if not thing.structure
+        TrueRange(obstacle.name, range_m[shown, column], ahead[shown, column])
+        for column, obstacle in enumerate(header.truth.objects)
+        if not obstacle.structure
     ]

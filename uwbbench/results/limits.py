@@ -113,7 +113,7 @@ class Trial:
         """True range (frames, echoes)."""
         truth = self.header.truth
         objects = truth.objects if truth is not None else ()
-        columns = [np.linalg.norm(thing.outline_m[:, 0], axis=-1) for thing in objects]
+        columns = [np.linalg.norm(obstacle.outline_m[:, 0], axis=-1) for obstacle in objects]
         return np.stack(columns, axis=1) if columns else np.empty((len(self.header), 0))
 
     @cached_property
@@ -191,7 +191,7 @@ class Limits:
 
     @cached_property
     def resolution(self) -> pd.DataFrame:
-        """How often two equal echoes are told apart."""
+        """How often two equal echoes are resolved."""
         return self._table("pair", _resolution)
 
     @cached_property
@@ -249,22 +249,22 @@ def _clear(range_m: FloatArray) -> BoolArray:
 def _accuracy(trial: Trial) -> Iterator[dict[str, Any]]:
     clear = _clear(trial.range_m[:, 0])
     error_m = trial.error_m[:, 0]
-    found = np.abs(error_m) <= GATE_M
-    kept = error_m[clear & found]
+    detected = np.abs(error_m) <= GATE_M
+    kept = error_m[clear & detected]
     bound_m = cramer_rao_range_m(trial.snr_db)
     rmse_m = float(np.sqrt(np.mean(kept**2))) if len(kept) else math.nan
     bias_m = float(np.mean(kept)) if len(kept) else math.nan
     facts = {"rmse_m": rmse_m, "bias_m": bias_m, "bound_m": bound_m, "ratio": rmse_m / bound_m}
-    yield {"detector": trial.detector, "snr_db": trial.snr_db, **trial.proportion(found, clear), **facts}
+    yield {"detector": trial.detector, "snr_db": trial.snr_db, **trial.proportion(detected, clear), **facts}
 
 
 def _detection(trial: Trial) -> Iterator[dict[str, Any]]:
     range_m = trial.range_m[:, 0]
-    found = np.abs(trial.error_m[:, 0]) <= GATE_M
+    detected = np.abs(trial.error_m[:, 0]) <= GATE_M
     for near, far in itertools.pairwise(RANGE_EDGES_M):
         inside = (range_m >= near) & (range_m < far)
         about = {"detector": trial.detector, "snr_db": trial.snr_db, "near_m": near, "far_m": far}
-        yield {**about, **trial.proportion(found, inside)}
+        yield {**about, **trial.proportion(detected, inside)}
 
 
 def _blind_zone(trial: Trial) -> Iterator[dict[str, Any]]:
@@ -272,10 +272,10 @@ def _blind_zone(trial: Trial) -> Iterator[dict[str, Any]]:
     steps = round(BLIND_UP_TO_M / BLIND_STEP_M)
     step: IntArray = np.floor(trial.range_m[:, 0] / BLIND_STEP_M).astype(np.int64)
     near = step < steps
-    found = np.abs(trial.error_m[:, 0]) <= GATE_M
+    detected = np.abs(trial.error_m[:, 0]) <= GATE_M
     echoes = np.bincount(step[near], minlength=steps)
-    hits = np.bincount(step[near & found], minlength=steps)
-    usual = float(np.mean(found[_clear(trial.range_m[:, 0])]))
+    hits = np.bincount(step[near & detected], minlength=steps)
+    usual = float(np.mean(detected[_clear(trial.range_m[:, 0])]))
     missed = np.flatnonzero(2 * hits < usual * echoes)
     radius_m = float(missed[-1] + 1) * BLIND_STEP_M if len(missed) else 0.0
     defined = usual > 0 and radius_m < BLIND_UP_TO_M

@@ -87,7 +87,7 @@ class Point:
 def speed_of(timed: Sequence[Entry]) -> Speed | None:
     """Speed of a detector from its latency entries of one dataset; None where it was never compared.
 
-    Several captures are put together by the mean of the logarithms, their intervals as those of independent values.
+    Several captures are combined by the mean of the logarithms, their intervals as those of independent values.
     """
     compared = [entry.facts for entry in timed if entry.facts.get("ratio_to_reference")]
     if not compared:
@@ -148,11 +148,11 @@ def points(
         spread = np.array([speeds[name].spread for name in names])
         drawn = np.random.default_rng([seed, 1]).normal(logs, spread, size=errors.shape)
         chance = front(drawn, errors).mean(axis=0)
-    found = [
+    placed = [
         Point(name, speeds[name], estimates[name], bool(on), float(p))
         for name, on, p in zip(names, best, chance, strict=True)
     ]
-    return sorted(found, key=lambda point: point.speed.ratio)
+    return sorted(placed, key=lambda point: point.speed.ratio)
 
 
 def front(cost: FloatArray, error: FloatArray) -> BoolArray:

@@ -1,4 +1,4 @@
-"""Figures of the paper whose detector ``paper`` is, to stand beside those of a run.
+"""Figures of the paper whose detector ``paper`` is, to be shown beside those of a run.
 
 They are read from ``configs/published``. A missing figure is shown as such and never filled in.
 """

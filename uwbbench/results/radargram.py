@@ -35,7 +35,7 @@ def reopened(used: Mapping[str, Any], name: str, sha256: str, roots: Sequence[Pa
     Parameters
     ----------
     used : mapping
-        The dataset as the manifest tells it: ``use`` and ``params``.
+        The dataset as the manifest records it: ``use`` and ``params``.
     name : str
         Of the capture.
     sha256 : str

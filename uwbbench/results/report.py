@@ -4,7 +4,7 @@ Conventions
 -----------
 * Captures are pooled before a number is made of them: the value is that of all their frames together.
 * Captures of different datasets, and measured and simulated ones, are never pooled; every row says which it is of.
-* Where the truth is not exhaustive an unmatched detection proves nothing: recall stands beside the recall of as many
+* Where the truth is not exhaustive an unmatched detection proves nothing: recall is shown beside the recall of as many
   random ranges (``chance_recall``), and precision and F1 are undefined.
 * Times are those of the machine that ran the experiment, and hold nowhere else.
 """
@@ -142,7 +142,7 @@ class Report:
     def paper_tables(self) -> pd.DataFrame:
         """The two tables of arXiv 2512.01018, for every detector and scoring: rows channel and material.
 
-        ``table`` tells them apart: ``filtering`` (error of the range) and ``mapping`` (distance to the outline).
+        ``table`` distinguishes them: ``filtering`` (error of the range) and ``mapping`` (distance to the outline).
         """
         import pandas as pd
 
@@ -177,9 +177,9 @@ class Report:
         for entry in self._of_kind("accuracy"):
             for step, count in entry.facts["chain"].items():
                 counts[entry.detector, entry.dataset, step] += count
-            found = self.folder.detections(entry.unit)
-            if "cluster" in found:
-                counts[entry.detector, entry.dataset, "in clusters"] += int((found["cluster"] >= 0).sum())
+            detections = self.folder.detections(entry.unit)
+            if "cluster" in detections:
+                counts[entry.detector, entry.dataset, "in clusters"] += int((detections["cluster"] >= 0).sum())
         rows = [(*key, count) for key, count in counts.items()]
         datasets = [used["label"] for used in self.experiment["datasets"]]
         rows.sort(key=lambda row: (self.detectors.index(row[0]), datasets.index(row[1])))
@@ -226,7 +226,7 @@ class Report:
 
     @cached_property
     def stability(self) -> list[dict[str, Any]]:
-        """How each detector stood the hard cases, in the order of the experiment."""
+        """Results of each detector in the hard cases, in the order of the experiment."""
         facts = {entry.detector: entry.facts for entry in self._of_kind("stability")}
         return [{"detector": name} | facts[name] for name in self.detectors if name in facts]
 
@@ -279,8 +279,13 @@ class Report:
 def _columns(estimates: Mapping[str, Estimate]) -> dict[str, float]:
     """Values, ends of the intervals and counts of samples, as columns of a table."""
     columns: dict[str, float] = {}
-    for name, one in estimates.items():
-        columns |= {name: one.value, f"{name}_low": one.low, f"{name}_high": one.high, f"{name}_n": one.n}
+    for name, estimate in estimates.items():
+        columns |= {
+            name: estimate.value,
+            f"{name}_low": estimate.low,
+            f"{name}_high": estimate.high,
+            f"{name}_n": estimate.n,
+        }
     return columns
 
 

@@ -79,14 +79,14 @@ def _scored(folder: RunFolder, rows: Mapping[Any, Any], rules: Sequence[ScoringR
             continue
         if entry.capture_id not in headers:
             headers[entry.capture_id] = folder.header(entry.capture_id)
-        found, header = folder.detections(entry.unit), headers[entry.capture_id]
+        detections, header = folder.detections(entry.unit), headers[entry.capture_id]
         try:
-            scene = Scene.of(found, header)
+            scene = Scene.of(detections, header)
         except ScoringError:  # its reason is in the stored scores
             continue
         for rule in rules:
             try:
-                tables = {name: judge(found, scene, rule, name).outcome for name in tables_of(found)}
+                tables = {name: judge(detections, scene, rule, name).outcome for name in tables_of(detections)}
             except ScoringError:
                 continue
             for name, outcome in tables.items():
@@ -103,7 +103,7 @@ def _scored(folder: RunFolder, rows: Mapping[Any, Any], rules: Sequence[ScoringR
                     channel=header.radar.channel,
                     material=" + ".join(entry.facts["materials"]) or "none",
                     frames=len(header),
-                    processed=len(found.processed),
+                    processed=len(detections.processed),
                     numbers=rows[key],
                     outcome=outcome,
                     range_m=_nearest_m(scene, rule),

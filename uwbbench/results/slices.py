@@ -32,7 +32,7 @@ ALL = ""
 """Value of a cut that takes everything."""
 
 Board = tuple[str, str, str, str]
-"""Dataset, source, scoring and table: numbers of different boards are never put together."""
+"""Dataset, source, scoring and table: numbers of different boards are never combined."""
 
 
 @dataclass(frozen=True)
@@ -165,15 +165,15 @@ def channel_name(channel: int | None) -> str:
     return "none" if channel is None else str(channel)
 
 
-def _spans(one: Scored, edges_m: FloatArray) -> dict[str, Outcome]:
+def _spans(scored: Scored, edges_m: FloatArray) -> dict[str, Outcome]:
     """Outcome in each range bin in which there are frames; none where a run has one bin."""
     bins = len(edges_m) - 1
     if bins < 2:
         return {}
-    number = np.where(np.isfinite(one.range_m), np.digitize(one.range_m, edges_m) - 1, -1)
+    number = np.where(np.isfinite(scored.range_m), np.digitize(scored.range_m, edges_m) - 1, -1)
     inside = {place: number == place for place in range(bins)}
     return {
-        span_name(edges_m[place], edges_m[place + 1]): subset(one.outcome, rows)
+        span_name(edges_m[place], edges_m[place + 1]): subset(scored.outcome, rows)
         for place, rows in inside.items()
         if rows.any()
     }

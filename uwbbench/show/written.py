@@ -89,7 +89,7 @@ def write(report: Report, path: Path, form: Format, roots: Sequence[Path], *, fo
     ReportToolsError
         If the libraries that a page needs are not installed.
     StoreError
-        If something else stands there, or it cannot be written.
+        If something else is there, or it cannot be written.
     """
     from uwbbench.run.folder.files import write_json, write_text
     from uwbbench.show.text import formats
@@ -113,7 +113,7 @@ def write_figures(report: Report, folder: Path, roots: Sequence[Path], *, force:
     roots : sequence of Path
         As in :func:`as_text`.
     force : bool
-        Write into a folder that holds other things.
+        Write into a folder that holds other files.
 
     Returns
     -------
@@ -125,7 +125,7 @@ def write_figures(report: Report, folder: Path, roots: Sequence[Path], *, force:
     ReportToolsError
         If the libraries that draw are not installed.
     StoreError
-        If something else stands there, or a file cannot be written.
+        If something else is there, or a file cannot be written.
     """
     from uwbbench.show import page
     from uwbbench.show.text import formats

@@ -36,21 +36,34 @@ def test_both_go_through_the_same_frames_in_blocks_of_abba_and_baab(approach: Ca
     log: list[tuple[str, int]] = []
     times_s = in_turns(recorded(approach, 8, log), size=1, blocks=4)
     assert "".join(name for name, _ in log) == "ABBA" + "BAAB" + "ABBA" + "BAAB"
-    assert [frame for _, frame in log] == [frame for frame in range(8) for _ in "AB"]
+    assert [frame for _, frame in log] == [frame for frame in range(4) for _ in "ABBA"]
     assert times_s.shape == (4, 2, 2)
     assert np.all(times_s > 0)
 
 
-def test_a_short_capture_starts_again_where_a_turn_does_not_fit(approach: Capture) -> None:
-    log: list[tuple[str, int]] = []
-    in_turns(recorded(approach, 5, log), size=2, blocks=2)
-    assert [frame for name, frame in log if name == "A"] == [0, 1, 2, 3, 0, 1, 2, 3]
+def test_both_turns_of_a_block_are_the_same_work_of_streams_of_their_own(approach: Capture) -> None:
+    seen: list[list[int]] = []
+
+    class Remembering(Recording):
+        """A detector each of whose streams notes the frames that it has seen."""
+
+        def open(self, _: Capture) -> "Recording":
+            seen.append([])
+            stream = Recording(self.name, [])
+            mine = seen[-1]
+            stream.step = lambda frames: mine.append(frames.first)  # type: ignore[attr-defined, method-assign]
+            return stream
+
+    one = Player(Remembering("A", []), approach, approach.frames(0, 6))  # type: ignore[arg-type]
+    for _ in range(6):
+        one.turn(2)
+    assert seen == [[0, 1, 2, 3, 4, 5]] * 2
 
 
-def test_a_turn_longer_than_the_capture_is_all_of_it(approach: Capture) -> None:
+def test_a_capture_starts_again_where_a_turn_does_not_fit(approach: Capture) -> None:
     log: list[tuple[str, int]] = []
-    in_turns(recorded(approach, 3, log), size=64, blocks=1)
-    assert [frame for name, frame in log if name == "A"] == [0, 1, 2] * 2
+    in_turns(recorded(approach, 5, log), size=2, blocks=3)
+    assert [frame for name, frame in log if name == "A"] == [0, 1, 0, 1, 2, 3, 2, 3, 0, 1, 0, 1]
 
 
 def test_taking_turns_again_starts_from_the_first_frame(approach: Capture) -> None:
@@ -106,16 +119,21 @@ def test_a_wait_longer_than_what_was_timed_is_none_of_it(approach: Capture, monk
 
 
 @pytest.mark.parametrize(
-    ("call_s", "frames"),
+    ("call_s", "frames", "size"),
     [
-        ([1e-6, 1e-5], 1500),  # 1.5 ms of the faster
-        ([1e-4, 1e-4], 64),  # work that comes every fifty frames is part of every turn
-        ([1e-6, 0.05], 5),  # a quarter of a second of the slower at most
-        ([1.0, 2.0], 1),
+        ([1e-6, 1e-5], 15_000, 1500),  # 1.5 ms of the faster
+        ([1e-4, 1e-4], 6400, 64),  # work that comes every fifty frames is part of every turn
+        ([1e-6, 0.05], 1000, 5),  # a quarter of a second of the slower at most
+        ([1.0, 2.0], 1000, 1),
+        ([1e-4, 1e-4], 100, 100),  # equal parts, of which no frame is left over
+        ([1e-4, 1e-4], 130, 65),
+        ([1e-4, 1e-4], 3, 3),
     ],
 )
-def test_a_turn_is_long_enough_for_the_faster_and_not_too_long_for_the_slower(call_s: list[float], frames: int) -> None:
-    assert turn_frames(call_s) == frames
+def test_a_turn_is_long_enough_for_the_faster_and_not_too_long_for_the_slower(
+    call_s: list[float], frames: int, size: int
+) -> None:
+    assert turn_frames(call_s, frames) == size
 
 
 def test_the_time_of_a_call_is_found_in_few_calls_of_a_slow_detector(approach: Capture) -> None:

@@ -5,6 +5,7 @@ import re
 import pytest
 
 from uwbbench import load_detector
+from uwbbench.api import PluginError
 from uwbbench.api.locate import shipped
 from uwbbench.measure.robustness import all_cases, case_named, examine
 from uwbbench.measure.robustness.subject import Subject
@@ -129,3 +130,40 @@ class Fragile(Stage[Params]):
     one, other = examine(make_detector("{use: fragile}"), cases).results
     assert (one.status, one.found) == ("failed", "ValueError: one frame is not enough")
     assert other.status == "passed"
+
+
+BROUGHT = '''
+from uwbbench.api import Evidence, Violation, hard_case
+
+
+@hard_case("survive")
+def {name}(subject):
+    """The first path is found in one frame."""
+    block = subject.through(subject.stage("first_path"), subject.block_of([[0, 0, 0, 0, 0, 1, 0, 0, 0] * 5]))
+    if block.first_path[0] != 5:
+        raise Violation("elsewhere")
+    return Evidence("there")
+
+
+CASES = ({name},)
+'''
+
+
+def test_a_package_brings_hard_cases_of_its_stages(install_plugin, make_detector):
+    install_plugin(
+        "brought", {"cases": {"brought": "brought_cases:CASES"}}, {"brought_cases.py": BROUGHT.format(name="one_crest")}
+    )
+    case = case_named("one-crest")
+    assert case in all_cases()
+    assert (case.group, case.asked) == ("brought_cases", "survive: The first path is found in one frame.")
+    with_path, without = make_detector(PATH, "{use: cfar.ca}", RANGE), make_detector("{use: reference.nothing}")
+    assert [one.status for one in examine(with_path, [case]).results] == ["passed"]
+    assert [one.detail for one in examine(without, [case]).results] == ["the detector has no stage 'first_path'"]
+
+
+def test_two_hard_cases_of_one_name_are_refused(install_plugin):
+    install_plugin(
+        "brought", {"cases": {"brought": "brought_cases:CASES"}}, {"brought_cases.py": BROUGHT.format(name="plateaus")}
+    )
+    with pytest.raises(PluginError, match="two hard cases are named 'plateaus'"):
+        all_cases()

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from uwbbench.api import StoreError
 from uwbbench.show.text.formats import MARK, check_replaceable, latex_escaped
+from uwbbench.show.text.sheet import Sheet
 
 
 @pytest.mark.parametrize(
@@ -61,3 +62,13 @@ def test_csv_tells_undefined_from_not_measured_and_starts_no_formula(tmp_path: P
     (row,) = csv.DictReader(_csv(rows).splitlines())
     assert row == {"name": "'=cmd|' /C calc'!A0", "undefined": "nan", "missing": "", "value": "0.125", "n": "3"}
     assert json.dumps(row)
+
+
+def test_a_latex_table_holds_hostile_cells_and_says_where_it_is_empty() -> None:
+    from uwbbench.show.text.formats import _latex_table
+
+    text = _latex_table(Sheet("a_b", ("d & e", "n/a"), (("[x] 5 %", "0.5 [0.4, 0.6]"),), ("50 %",)))
+    assert "{}[x] 5 \\% & 0.5 [0.4, 0.6] \\\\\n" in text
+    assert "\\begin{tabular}{lr}\n\\toprule\nd \\& e & n/a \\\\\n\\midrule" in text
+    assert text.splitlines()[-2:] == ["\\par\\footnotesize 50 \\%", "\\end{table*}"]
+    assert "None. &" in _latex_table(Sheet("none", ("a", "b"), ()))

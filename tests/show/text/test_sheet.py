@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from uwbbench.show.text.numbers import interval, number
+from uwbbench.show.text.numbers import interval, number, p_value, probability, rounded
 from uwbbench.show.text.sheet import LONGEST_NAME, Sheet, escaped, shown
 
 
@@ -45,6 +45,15 @@ def test_undefined_numbers_are_not_available() -> None:
     assert interval(0.5, float("nan"), float("nan"), 2) == "0.50"
     assert interval(0.051, 0.049, 0.06, 1, 100.0) == "5.1 [4.9, 6.0]"
     assert interval(float("nan"), 0.1, 0.2, 2) == "n/a"
+
+
+def test_a_probability_is_never_rounded_to_certainty() -> None:
+    assert [p_value(p) for p in (0.0, 0.0009, 0.03, 1.0, float("nan"))] == ["<0.001", "<0.001", "0.030", "1.000", "n/a"]
+    assert [probability(share) for share in (0.0, 0.5, 1.0, float("nan"))] == ["<0.01", "0.50", ">0.99", "n/a"]
+
+
+def test_numbers_for_programs_have_five_digits_or_are_none() -> None:
+    assert (rounded(1234567.0), rounded(None), rounded(float("inf"))) == (1234600.0, None, None)
 
 
 def test_an_empty_sheet_says_so() -> None:

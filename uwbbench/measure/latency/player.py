@@ -2,11 +2,13 @@
 
 What a turn is
 --------------
-* A turn is the time of the next frames of a capture, one frame a call. It lasts ``TURN_S`` or longer: thousands of
-  readings of the clock, and less than the time slice of another process.
-* It has ``TURN_FRAMES`` frames or more, so that work that comes every fifty, such as clustering, is part of every turn
-  and all turns are of about the same work; unless a detector is so slow that it would take longer than
-  ``LONGEST_TURN_S`` for them.
+* A turn is the time of some consecutive frames of a capture, one frame a call. It lasts ``TURN_S`` or longer: thousands
+  of readings of the clock, and less than the time slice of another process.
+* It has ``TURN_FRAMES`` frames or more, so that work that comes every fifty, such as clustering, is part of every turn,
+  unless a detector is so slow that it would take longer than ``LONGEST_TURN_S`` for them. The parts of a capture are
+  equally long, and next to nothing of it is left over.
+* Both turns of a block are the same work: a detector has two streams, which go through the same frames one after the
+  other, so that the faster of both is the less disturbed one and never the one that had less to do.
 * On a busy machine other processes take the core for milliseconds. Linux counts for each thread how long it waited for
   its core; that time is no detector's, and is left out of the turn: with both cores busy, that halved the scatter of
   blocks as long as a time slice. Processor time would do the same, but a detector that sleeps or waits for a file would
@@ -43,7 +45,7 @@ PROBED_S = 0.01
 
 
 class Player:
-    """A detector with preloaded frames of a capture, which it goes through one frame a call, again and again.
+    """A detector with preloaded frames of a capture, which two streams of it go through again and again.
 
     Parameters
     ----------
@@ -67,6 +69,7 @@ class Player:
         self.pipeline, self.capture, self.whole = pipeline, capture, whole
         if not len(self.whole):
             raise CaptureError(f"capture '{capture.name}' has no frames; there is nothing to time")
+        self._at, self._again = 0, False
         self.rewind()
 
     @property
@@ -91,17 +94,19 @@ class Player:
         return max(float(np.median(times_ns)), 1.0) * 1e-9
 
     def turn(self, size: int) -> float:
-        """Time of the next ``size`` frames, in seconds; where too few are left, the capture starts again.
+        """Time of ``size`` frames, in seconds: of the first stream, then of the second on the same, then of the next.
 
-        Opening a stream and cutting frames is not part of the time, nor is waiting for the core while other processes
-        have it, where the system tells. What the detector waits for by itself, such as a file, is.
+        Where too few frames are left, the capture starts again. Opening streams and cutting frames is not part of the
+        time, nor is waiting for the core while other processes have it, where the system tells. What the detector waits
+        for by itself, such as a file, is.
         """
-        size = min(size, len(self.whole))
-        if self._at + size > len(self.whole):
+        if not self._again and self._at + size > len(self.whole):
             self._reopen()
         calls = cut(self.whole.part(self._at, self._at + size), 1)
-        self._at += size
-        step = self._stream.step
+        step = self._streams[self._again].step
+        if self._again:
+            self._at += size
+        self._again = not self._again
         gc.disable()  # without collecting first, which takes longer than a turn and empties the caches
         try:
             with core_waits() as waits_ns:
@@ -118,12 +123,13 @@ class Player:
         return (spent_ns - waited_ns if waited_ns < spent_ns else spent_ns) * 1e-9
 
     def rewind(self) -> None:
-        """Start the capture again, with a stream opened anew, and forget earlier turns."""
+        """Start the capture again, with streams opened anew, and forget earlier turns."""
         self.waited_s: list[float] = []
         self._reopen()
 
     def _reopen(self) -> None:
-        self._stream, self._at = self.pipeline.open(self.capture), 0
+        self._streams = [self.pipeline.open(self.capture) for _ in range(2)]
+        self._at, self._again = 0, False
 
     def responses_us(self, count: int, rate_hz: float, *, paced: bool) -> FloatArray:
         """Response times (count,) of single frames, from the moment each is due to its answer.
@@ -140,10 +146,11 @@ class Player:
         return responses_us(times_us, 1e6 / rate_hz)
 
 
-def turn_frames(call_s: Sequence[float]) -> int:
-    """Frames of a turn of detectors that take so long for a frame."""
-    frames = max(TURN_FRAMES, math.ceil(TURN_S / min(call_s)))
-    return max(1, min(frames, int(LONGEST_TURN_S / max(call_s))))
+def turn_frames(call_s: Sequence[float], frames: int) -> int:
+    """Frames of a turn of detectors that take so long for a frame, on a capture of so many frames."""
+    least = max(TURN_FRAMES, math.ceil(TURN_S / min(call_s)))
+    size = max(1, min(least, int(LONGEST_TURN_S / max(call_s))))
+    return frames // max(1, frames // size)
 
 
 def in_turns(players: Sequence[Player], size: int, blocks: int) -> FloatArray:
@@ -154,7 +161,7 @@ def in_turns(players: Sequence[Player], size: int, blocks: int) -> FloatArray:
     players : sequence of Player
         Warm: what is compiled in here would be part of the times.
     size : int
-        Frames of a turn.
+        Frames of a turn, no more than there are.
     blocks : int
     """
     for player in players:

@@ -12,7 +12,7 @@ Conventions
   what happened before, such as caches that another process has emptied.
 * A program's time in a block is its faster turn. Disturbances only ever make a turn longer, so a block is disturbed
   only where both turns of a program were: with three turns in ten disturbed, the interval of 100 blocks is a third as
-  wide as that of the sums of the turns. Both turns must be of about the same work.
+  wide as that of the sums of the turns. Both turns must be of the same work.
 * The ratio is exp of the median over blocks of the log ratio: the typical block.
 * Its interval (95 %) is that of the median by order statistics, which supposes nothing of the distribution: with n
   blocks, the k-th smallest and the k-th largest log ratio, k being the largest number for which a binomial variable of

@@ -171,9 +171,8 @@ def _ratio(
     reference = _pipeline(spec["reference"])
     players = [Player(one, capture, whole) for one in (pipeline, reference)]
     players[1].warm_up(spec["warmup_windows"])
-    size = turn_frames([player.call_s() for player in players])
-    once_through = -(-len(whole) // (2 * size))  # so that all frames count in the ratio of all time together
-    blocks = max(spec["blocks"], once_through)
+    size = turn_frames([player.call_s() for player in players], len(whole))
+    blocks = max(spec["blocks"], len(whole) // size)  # all frames count in the ratio of all time together
     times_s, compilations = undisturbed(lambda: in_turns(players, size, blocks))
     waited_s = np.reshape([player.waited_s for player in players], (-1, blocks, 2))
     disturbed = int(np.count_nonzero(waited_s.any(axis=(0, 2))))

@@ -25,7 +25,7 @@ KEYS = {"detectors": "name", "datasets": "label", "pipeline": "as"}
 
 @dataclass(frozen=True)
 class Change:
-    """One thing that differs.
+    """One difference in what went into two runs.
 
     Attributes
     ----------
@@ -66,9 +66,9 @@ def _nested(path: str, before: Any, after: Any) -> Iterator[Change]:
             continue
         sides = [{item[name]: item for item in items} for items in (old, new)]
         yield from _differing("configuration", *({f"{at}, in order": list(side)} for side in sides))
-        for one in sides[0]:
-            if one in sides[1]:
-                yield from _nested(f"{at}.{one}", sides[0][one], sides[1][one])
+        for label in sides[0]:
+            if label in sides[1]:
+                yield from _nested(f"{at}.{label}", sides[0][label], sides[1][label])
 
 
 def _code(first: RunFolder, second: RunFolder) -> Iterator[Change]:

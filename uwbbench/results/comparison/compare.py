@@ -59,7 +59,7 @@ class Comparison:
     @property
     def changed_scores(self) -> tuple[ScoreChange, ...]:
         """Scores that differ by more than rounding."""
-        return tuple(one for one in self.scores if one.changed)
+        return tuple(change for change in self.scores if change.changed)
 
     @property
     def differs(self) -> bool:
@@ -80,14 +80,14 @@ class Comparison:
             "changes": [vars(change) for change in self.changes],
             "scores": [
                 {
-                    **dict(zip(("dataset", "source", "scoring", "table"), one.board, strict=True)),
-                    **{key: getattr(one, key) for key in ("detector", "metric", "captures", "before", "after")},
-                    "difference": dataclasses.asdict(one.difference),
-                    "p_adjusted": one.adjusted,
+                    **dict(zip(("dataset", "source", "scoring", "table"), change.board, strict=True)),
+                    **{key: getattr(change, key) for key in ("detector", "metric", "captures", "before", "after")},
+                    "difference": dataclasses.asdict(change.difference),
+                    "p_adjusted": change.adjusted,
                 }
-                for one in self.scores
+                for change in self.scores
             ],
-            "times": [dataclasses.asdict(one) for one in self.times],
+            "times": [dataclasses.asdict(change) for change in self.times],
             "flips": {
                 "scoring": self.scoring,
                 "frames": self.compared_frames,
@@ -96,7 +96,7 @@ class Comparison:
                     for detector, counter in self.flip_counts.items()
                     for (before, after), count in counter.most_common()
                 ],
-                "worst": [_flip(one) for one in self.worst],
+                "worst": [_flip(flip) for flip in self.worst],
             },
             "notes": list(self.notes),
         }
@@ -123,10 +123,12 @@ def compare(first: RunFolder, second: RunFolder, scoring: str | None = None, mos
     with read_safely(first.path):
         rules = {rule.scoring: rule for rule in first.rules}
         settings = {**first.manifest["experiment"]["intervals"], "seed": first.manifest["experiment"]["seed"]}
-        metrics = MetricChoice([name for one in (first, second) for name in one.manifest["experiment"]["metrics"]])
+        metrics = MetricChoice(
+            [name for folder in (first, second) for name in folder.manifest["experiment"]["metrics"]]
+        )
     if scoring is not None and scoring not in rules:
         raise ConfigError(f"{first.path}: was not scored by '{scoring}'.{nearest(scoring, rules)}")
-    rule = next(one for name, one in rules.items() if scoring in (None, name))
+    rule = next(rule for name, rule in rules.items() if scoring in (None, name))
     with read_safely(second.path):
         different = changes(first, second)
         units, left_out = shared(first, second)
@@ -160,6 +162,6 @@ def _seal(folder: RunFolder) -> Iterator[str]:
         yield f"{folder.path}: its manifest was changed after the run ended; see 'uwbbench verify'"
 
 
-def _flip(one: Flip) -> dict[str, Any]:
-    about = {key: getattr(one.unit, key) for key in ("detector", "dataset", "capture")}
-    return about | {field.name: getattr(one, field.name) for field in dataclasses.fields(one) if field.name != "unit"}
+def _flip(flip: Flip) -> dict[str, Any]:
+    about = {key: getattr(flip.unit, key) for key in ("detector", "dataset", "capture")}
+    return about | {field.name: getattr(flip, field.name) for field in dataclasses.fields(flip) if field.name != "unit"}

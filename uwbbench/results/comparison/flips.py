@@ -82,7 +82,7 @@ def flips(
     for unit in units:
         try:
             tables = [_frames(unit, side, rule) for side in (0, 1)]
-        except ScoringError:  # told with the scores
+        except ScoringError:  # score_changes reports it
             continue
         index, rows = np.intersect1d(tables[0][0], tables[1][0]), []
         for scored, outcome, _ in tables:
@@ -100,8 +100,8 @@ def flips(
 
 def _frames(unit: Unit, side: int, rule: ScoringRules) -> tuple[IntArray, Outcome, FloatArray]:
     """Scored frames, their outcome, and the largest absolute error (frames of the capture,) of each frame."""
-    scene = Scene.of(unit.found[side], unit.header)
-    outcome = judge(unit.found[side], scene, rule, "filtering").outcome
+    scene = Scene.of(unit.detections[side], unit.header)
+    outcome = judge(unit.detections[side], scene, rule, "filtering").outcome
     scored = np.flatnonzero(scene.scored).astype(np.int64)
     error_m = np.full(len(unit.header), np.nan)
     np.fmax.at(error_m, scored[outcome.error_frame], np.abs(outcome.error_m))
@@ -122,7 +122,7 @@ def _worst(
     loss = before @ value - after @ value
     grown = np.nan_to_num(errors_m[1][frames]) - np.nan_to_num(errors_m[0][frames])
     since_s = unit.header.trajectory.timestamp_s - unit.header.trajectory.timestamp_s[:1]
-    found = [
+    new = [
         Flip(
             unit=unit,
             frame=int(frames[row]),
@@ -135,7 +135,7 @@ def _worst(
         )
         for row in np.lexsort((frames, -grown, -loss))[:most].tolist()
     ]
-    return sorted([*known, *found], key=lambda flip: flip._badness)[:most]
+    return sorted([*known, *new], key=lambda flip: flip._badness)[:most]
 
 
 def _name(counts: Sequence[int]) -> str:

@@ -105,7 +105,7 @@ def score_changes(
     for unit in units:
         for rule in rules:
             try:
-                before, after = (outcomes(found, unit.header, rule) for found in unit.found)
+                before, after = (outcomes(detections, unit.header, rule) for detections in unit.detections)
             except ScoringError as error:
                 missing[f"not judged by {rule.scoring}: {error}"] = None
                 continue
@@ -139,7 +139,7 @@ def time_changes(first: RunFolder, second: RunFolder) -> tuple[list[TimeChange],
     """Time ratios that both runs measured, and what could not be compared."""
     sides = [_speeds(folder) for folder in (first, second)]
     identities = [folder.manifest.get("reference") for folder in (first, second)]
-    found, missing = [], dict[str, None]()
+    compared, missing = [], dict[str, None]()
     for (dataset, detector), before in sides[0].items():
         after = sides[1].get((dataset, detector))
         if after is None:
@@ -151,8 +151,8 @@ def time_changes(first: RunFolder, second: RunFolder) -> tuple[list[TimeChange],
         reach = NORMAL_975 * math.hypot(before.spread, after.spread)
         reach = math.nan if math.isnan(before.low) or math.isnan(after.low) else reach
         ends = [math.exp(value) for value in (middle, middle - reach, middle + reach)]
-        found.append(TimeChange(dataset, detector, before, after, *ends))
-    return found, list(missing)
+        compared.append(TimeChange(dataset, detector, before, after, *ends))
+    return compared, list(missing)
 
 
 def _speeds(folder: RunFolder) -> dict[tuple[str, str], Speed]:

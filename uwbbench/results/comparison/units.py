@@ -45,7 +45,7 @@ class Unit:
         return self.folders[0].header(self.entries[0].capture_id)
 
     @cached_property
-    def found(self) -> tuple[Detections, Detections]:
+    def detections(self) -> tuple[Detections, Detections]:
         """What was detected, before and after."""
         first, second = (folder.detections(e.unit) for folder, e in zip(self.folders, self.entries, strict=True))
         return first, second

@@ -2,7 +2,7 @@
 
 Conventions
 -----------
-* A board is one dataset, source, scoring and table of a suite; numbers of different boards are never put together.
+* A board is one dataset, source, scoring and table of a suite; numbers of different boards are never combined.
 * Boards are ranked by the metric that their experiment lists first, or by F1; by recall where the truth is not
   exhaustive.
 * Two detectors are compared on the captures that both were scored on, in pairs: both are evaluated on the same drawn
@@ -130,18 +130,30 @@ class Ranking:
 
     @property
     def headline(self) -> list[str]:
-        """Names of the few metrics that stand on the index."""
+        """Names of the few metrics that the index shows."""
         return self.metrics.headline(exhaustive=self.exhaustive)
 
     def pair(self, first: str, second: str, metric: str) -> Pair | None:
-        """Comparison of two contenders, first minus second."""
-        for one in self.pairs:
-            if (one.first, one.second, one.metric) == (first, second, metric):
-                return one
-            if (one.second, one.first, one.metric) == (first, second, metric):
-                d = one.difference
+        """Comparison of two contenders, first minus second, in whichever order it is stored.
+
+        Parameters
+        ----------
+        first, second : str
+            Keys of contenders.
+        metric : str
+
+        Returns
+        -------
+        Pair or None
+            None where the two were not compared by this metric.
+        """
+        for pair in self.pairs:
+            if (pair.first, pair.second, pair.metric) == (first, second, metric):
+                return pair
+            if (pair.second, pair.first, pair.metric) == (first, second, metric):
+                d = pair.difference
                 turned = dataclasses.replace(d, value=-d.value, low=-d.high, high=-d.low)
-                return dataclasses.replace(one, first=first, second=second, difference=turned)
+                return dataclasses.replace(pair, first=first, second=second, difference=turned)
         return None
 
 
@@ -186,9 +198,9 @@ def _ranking(suite: Suite, board: Board, members: Mapping[str, list[Scored]]) ->
     return Ranking(suite, board, exhaustive, main, captures, tuple(standings), pairs)
 
 
-def _order(one: Standing, merit: float) -> tuple[Any, ...]:
+def _order(standing: Standing, merit: float) -> tuple[Any, ...]:
     """Ranked ones first, the best first; undefined values last."""
-    return one.rank is None, one.rank or 0, math.inf if math.isnan(merit) else -merit, one.contender.name
+    return standing.rank is None, standing.rank or 0, math.inf if math.isnan(merit) else -merit, standing.contender.name
 
 
 def _pairs(members: Mapping[str, list[Scored]], metrics: MetricChoice, names: Sequence[str]) -> tuple[Pair, ...]:
@@ -225,10 +237,10 @@ def _verdict(difference: Difference, adjusted: float, margin: float) -> Verdict:
 
 def reference_of(suite: Suite) -> tuple[str, str] | None:
     """Name and identity of the reference that most detectors were timed against; None where nothing was timed."""
-    found: Counter[tuple[str, str]] = Counter()
-    for one in suite.contenders:
-        found.update({key for run, entry in one.timed if (key := _reference(run, entry)) is not None})
-    return max(found, key=lambda key: (found[key], key)) if found else None
+    uses: Counter[tuple[str, str]] = Counter()
+    for contender in suite.contenders:
+        uses.update({key for run, entry in contender.timed if (key := _reference(run, entry)) is not None})
+    return max(uses, key=lambda key: (uses[key], key)) if uses else None
 
 
 def _reference(run: Run, entry: Entry) -> tuple[str, str] | None:
@@ -237,38 +249,52 @@ def _reference(run: Run, entry: Entry) -> tuple[str, str] | None:
 
 
 def speeds_by_machine(suite: Suite, contender: Contender, dataset: str) -> dict[str, Speed]:
-    """Speed on each machine, against the common reference only."""
+    """Speed on each machine, against the common reference only.
+
+    Parameters
+    ----------
+    suite : Suite
+        Whose most used reference is the common one.
+    contender : Contender
+    dataset : str
+        Label.
+
+    Returns
+    -------
+    dict of str to Speed
+        By machine as one line; without machines on which the contender was not compared with that reference.
+    """
     common = reference_of(suite)
     timed: dict[str, dict[str, Any]] = defaultdict(dict)
     for run, entry in contender.timed:  # the newest run of a machine counts
         if entry.dataset == dataset and common is not None and _reference(run, entry) == common:
             timed[run.machine_of(entry)][entry.capture] = entry
-    found = {machine: speed_of(list(entries.values())) for machine, entries in timed.items()}
-    return {machine: speed for machine, speed in found.items() if speed is not None}
+    speeds = {machine: speed_of(list(entries.values())) for machine, entries in timed.items()}
+    return {machine: speed for machine, speed in speeds.items() if speed is not None}
 
 
 def speeds_of(suite: Suite, dataset: str) -> dict[str, Speed]:
-    """Speed of each contender, put together over machines.
+    """Speed of each contender, combined over machines.
 
     The median time of a frame belongs to a machine, so it is NaN; so is the frame period in times of the reference
     unless all were timed on one machine.
     """
     by_machine = {one.key: speeds_by_machine(suite, one, dataset) for one in suite.contenders}
-    machines = {machine for found in by_machine.values() for machine in found}
+    machines = {machine for speeds in by_machine.values() for machine in speeds}
     return {
-        key: _together(list(found.values()), one_machine=len(machines) == 1)
-        for key, found in by_machine.items()
-        if found
+        key: _together(list(speeds.values()), one_machine=len(machines) == 1)
+        for key, speeds in by_machine.items()
+        if speeds
     }
 
 
-def _together(found: Sequence[Speed], *, one_machine: bool) -> Speed:
+def _together(speeds: Sequence[Speed], *, one_machine: bool) -> Speed:
     return Speed(
-        reference=found[0].reference,
-        ratio=math.exp(float(np.mean([math.log(one.ratio) for one in found]))),
-        low=float(np.min([one.low for one in found])),
-        high=float(np.max([one.high for one in found])),
-        captures=max(one.captures for one in found),
-        deadline=found[0].deadline if one_machine else math.nan,
+        reference=speeds[0].reference,
+        ratio=math.exp(float(np.mean([math.log(speed.ratio) for speed in speeds]))),
+        low=float(np.min([speed.low for speed in speeds])),
+        high=float(np.max([speed.high for speed in speeds])),
+        captures=max(speed.captures for speed in speeds),
+        deadline=speeds[0].deadline if one_machine else math.nan,
         p50_us=math.nan,
     )

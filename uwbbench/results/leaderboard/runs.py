@@ -28,9 +28,9 @@ class Unverified(UwbbenchError):
     """
 
     def __init__(self, problems: Mapping[str, Sequence[str]]) -> None:
-        lines = [f"{run}: {problem}" for run, found in problems.items() for problem in found]
+        lines = [f"{run}: {problem}" for run, listed in problems.items() for problem in listed]
         super().__init__("\n".join(["these runs do not verify, so nothing was written:", *lines]))
-        self.problems = {run: list(found) for run, found in problems.items()}
+        self.problems = {run: list(listed) for run, listed in problems.items()}
 
 
 @dataclass(frozen=True)
@@ -76,10 +76,10 @@ class Run:
     @cached_property
     def scored_by_unit(self) -> dict[tuple[str, str, str], list[Scored]]:
         """What was scored, by detector, dataset and capture."""
-        found: dict[tuple[str, str, str], list[Scored]] = {}
+        by_unit: dict[tuple[str, str, str], list[Scored]] = {}
         for one in self.scored:
-            found.setdefault((one.detector, one.dataset, one.capture), []).append(one)
-        return found
+            by_unit.setdefault((one.detector, one.dataset, one.capture), []).append(one)
+        return by_unit
 
     def machine_of(self, entry: Entry) -> str:
         """The machine that a latency unit was measured on, as one line."""
@@ -123,20 +123,19 @@ def read_runs(paths: Sequence[Path], progress: Callable[[str], None] | None = No
     for folder in folders:
         if progress is not None:
             progress(f"verifying {folder.path}")
-        found = verify(folder)
-        checked.append(found.checked)
-        if not found.passed:
-            problems[str(folder.path)] = found.problems
+        verification = verify(folder)
+        checked.append(verification.checked)
+        if not verification.passed:
+            problems[str(folder.path)] = verification.problems
     if problems:
         raise Unverified(problems)
     _distinct(folders)
     names = _names([folder.path for folder in folders])
-    runs = [read_run(*one) for one in zip(folders, names, checked, strict=True)]
+    runs = [_read_run(*verified) for verified in zip(folders, names, checked, strict=True)]
     return sorted(runs, key=lambda run: (run.started, run.manifest["seal"]))
 
 
-def read_run(folder: RunFolder, name: str, checked: Mapping[str, int]) -> Run:
-    """Read a verified run."""
+def _read_run(folder: RunFolder, name: str, checked: Mapping[str, int]) -> Run:
     with read_safely(folder.path):
         return Run(name, folder, tuple(folder.entries()), tuple(scored(folder)), tuple(folder.rules), checked)
 
@@ -152,12 +151,12 @@ def _distinct(folders: Sequence[RunFolder]) -> None:
 
 
 def _names(paths: Sequence[Path]) -> list[str]:
-    """Distinct names: the folder's, with as many parents as it takes to tell it from the others."""
-    whole = [path.resolve().parts for path in paths]
+    """Distinct names: the folder's, with as many parents as it takes to distinguish it from the others."""
+    all_parts = [path.resolve().parts for path in paths]
     names = []
-    for parts in whole:
+    for parts in all_parts:
         length = next(
-            (n for n in range(1, len(parts)) if sum(other[-n:] == parts[-n:] for other in whole) == 1), len(parts)
+            (n for n in range(1, len(parts)) if sum(other[-n:] == parts[-n:] for other in all_parts) == 1), len(parts)
         )
         names.append("/".join(part for part in parts[-length:] if part != "/"))
     return names

@@ -1,4 +1,4 @@
-"""Runs put together: those of one experiment on the same captures under the same rules.
+"""Runs combined: those of one experiment on the same captures under the same rules.
 
 Conventions
 -----------
@@ -9,7 +9,7 @@ Conventions
 * A detector is its name with its identity (steps, parameters and sources). The same name with another identity is
   another version of it, with a row and a page of its own.
 * The same detector on the same capture in several runs: the newest run in which it worked counts. Where an older one
-  gave other scores, that is told.
+  gave other scores, that is noted.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ class Contender:
     timed : list of (Run, Entry)
         Latency units that worked, of all runs.
     stability : mapping or None
-        How it stood the hard cases, in the newest run that put them to it.
+        Its results in the hard cases, from the newest run that has any.
     disagreements : list of str
         Where an older run gave other scores.
     """
@@ -65,18 +65,18 @@ class Contender:
 
     @property
     def key(self) -> str:
-        """What tells it from all others."""
+        """What distinguishes it from all others."""
         return digest([self.name, self.identity])
 
     @cached_property
     def scored(self) -> list[Scored]:
         """What counts, with the key as the detector's name."""
-        found = []
+        counted = []
         for (dataset, capture), (run, entry) in sorted(self.chosen.items()):
             if entry.status == "done":
                 rows = run.scored_by_unit.get((self.name, dataset, capture), [])
-                found += [dataclasses.replace(one, detector=self.key) for one in rows]
-        return found
+                counted += [dataclasses.replace(one, detector=self.key) for one in rows]
+        return counted
 
 
 @dataclass
@@ -110,7 +110,7 @@ class Suite:
 
     @cached_property
     def metrics(self) -> MetricChoice:
-        """Metrics that its runs show; what the newest run lists stands first."""
+        """Metrics that its runs show; what the newest run lists comes first."""
         return MetricChoice([name for run in reversed(self.runs) for name in run.experiment["metrics"]])
 
     @property
@@ -129,9 +129,9 @@ def suites(runs: Sequence[Run]) -> list[Suite]:
     runs : sequence of Run
         The oldest first.
     """
-    made = [_suite(name, members, captures) for name, members, captures in _versions(runs)]
-    made.sort(key=lambda suite: suite.newest.started, reverse=True)
-    return sorted(made, key=lambda suite: suite.name)
+    versions = [_suite(name, members, captures) for name, members, captures in _versions(runs)]
+    versions.sort(key=lambda suite: suite.newest.started, reverse=True)
+    return sorted(versions, key=lambda suite: suite.name)
 
 
 def _versions(runs: Sequence[Run]) -> Iterator[tuple[str, list[Run], dict[CaptureKey, str]]]:
@@ -157,12 +157,12 @@ def _versions(runs: Sequence[Run]) -> Iterator[tuple[str, list[Run], dict[Captur
 
 def _captures(run: Run) -> dict[CaptureKey, str]:
     """Content of each capture of a run; empty where it was not opened."""
-    found: dict[CaptureKey, str] = {}
+    contents: dict[CaptureKey, str] = {}
     for entry in run.entries:
         if entry.kind == "accuracy":
             content = run.manifest["data"].get(entry.capture_id, "")
-            found[entry.dataset, entry.capture] = content or found.get((entry.dataset, entry.capture), "")
-    return found
+            contents[entry.dataset, entry.capture] = content or contents.get((entry.dataset, entry.capture), "")
+    return contents
 
 
 def _suite(name: str, runs: list[Run], captures: dict[CaptureKey, str]) -> Suite:
@@ -172,28 +172,28 @@ def _suite(name: str, runs: list[Run], captures: dict[CaptureKey, str]) -> Suite
     for run in runs:
         configs = {config["name"]: config for config in run.experiment["detectors"]}
         for detector, identity in run.manifest["detectors"].items():
-            one = contenders.setdefault((detector, identity), Contender(detector, identity, configs[detector]))
-            one.runs.append(run)
-            _take(one, run, [entry for entry in run.entries if entry.detector == detector])
+            contender = contenders.setdefault((detector, identity), Contender(detector, identity, configs[detector]))
+            contender.runs.append(run)
+            _take(contender, run, [entry for entry in run.entries if entry.detector == detector])
     order = sorted(contenders.values(), key=lambda one: (one.name, one.runs[0].started, one.identity))
     return Suite(name, version, runs, dict(sorted(captures.items())), order)
 
 
-def _take(one: Contender, run: Run, entries: Iterable[Entry]) -> None:
+def _take(contender: Contender, run: Run, entries: Iterable[Entry]) -> None:
     """Let a newer run count, without losing what worked in an older one."""
     for entry in entries:
         if entry.kind == "accuracy":
             key = entry.dataset, entry.capture
-            before = one.chosen.get(key)
+            before = contender.chosen.get(key)
             if before is None or entry.status == "done":
-                one.chosen[key] = run, entry
+                contender.chosen[key] = run, entry
             if before is not None and before[1].status == entry.status == "done":
                 other = _difference(before[0], run, entry)
-                one.disagreements += [other] if other else []
+                contender.disagreements += [other] if other else []
         elif entry.status == "done" and entry.kind == "latency":
-            one.timed.append((run, entry))
+            contender.timed.append((run, entry))
         elif entry.status == "done" and entry.kind == "stability":
-            one.stability = entry.facts
+            contender.stability = entry.facts
 
 
 def _difference(old: Run, new: Run, entry: Entry) -> str:

@@ -23,7 +23,22 @@ HEIGHT = 400
 
 
 def chart(title: str, subtitle: str, layers: list[Spec], **more: Any) -> Spec:
-    """Chart of several layers, as wide as where it stands."""
+    """Chart of several layers, as wide as the element around it.
+
+    Parameters
+    ----------
+    title, subtitle : str
+        The subtitle may be empty.
+    layers : list of dict
+        Vega-Lite layers, the lowest first.
+    **more
+        Further keys of the specification, such as ``data`` or ``params``.
+
+    Returns
+    -------
+    dict
+        Vega-Lite specification without colours of paper and ink.
+    """
     head = {"text": title, "subtitle": subtitle} if subtitle else {"text": title}
     return {
         "$schema": SCHEMA,
@@ -92,7 +107,17 @@ def limits(values: Sequence[float], *, share: float = 0.06) -> list[float]:
 
 
 def deadline(at: float, text: str, x: Spec) -> Spec:
-    """Layer that marks the radar's frame period."""
+    """Layer that marks the radar's frame period.
+
+    Parameters
+    ----------
+    at : float
+        Place on the axis of times, in its unit; nothing is drawn where it is not finite.
+    text : str
+        Written beside the line.
+    x : dict
+        Scale and other keys of that axis, so that the layer shares it.
+    """
     return {
         "data": {"values": [{"at": at, "text": text}] if math.isfinite(at) else []},
         "layer": [

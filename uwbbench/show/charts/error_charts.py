@@ -1,4 +1,4 @@
-"""Errors: by range, and as a whole distribution."""
+"""Errors: by range, and as a distribution."""
 
 from __future__ import annotations
 
@@ -14,21 +14,34 @@ from uwbbench.show.text.quantity import Quantity
 SHARES = (0, 0.25, 0.5, 0.75, 0.9, 0.95, 1)
 
 
-def by_range(title: str, found: Sequence[Slice], spans: Sequence[str], names: Mapping[str, str], by: Quantity) -> Spec:
-    """A metric against range, a point with its interval for each detector and bin."""
+def by_range(title: str, slices: Sequence[Slice], spans: Sequence[str], names: Mapping[str, str], by: Quantity) -> Spec:
+    """A metric against range, a point with its interval for each detector and bin.
+
+    Parameters
+    ----------
+    title : str
+    slices : sequence of Slice
+        Cuts of one board by range; those without a value are left out.
+    spans : sequence of str
+        Names of the bins, the nearest first.
+    names : mapping of str to str
+        Labels of detectors.
+    by : Quantity
+        The metric.
+    """
     rows: list[Spec] = []
-    for one in found:
-        estimate = one.estimates[by.name]
+    for part in slices:
+        estimate = part.estimates[by.name]
         if not math.isnan(estimate.value):
             value, low, high = (by.scaled(v) for v in (estimate.value, estimate.low, estimate.high))
             rows.append(
                 {
-                    "detector": names[one.detector],
-                    "span": one.span,
+                    "detector": names[part.detector],
+                    "span": part.span,
                     "value": value,
                     "low": value if math.isnan(low) else low,
                     "high": value if math.isnan(high) else high,
-                    "told": by.told(estimate),
+                    "text": by.in_full(estimate),
                 }
             )
     series = Series(names, [row["detector"] for row in rows])
@@ -48,7 +61,7 @@ def by_range(title: str, found: Sequence[Slice], spans: Sequence[str], names: Ma
     tooltip = [
         {"field": "detector", "title": "Detector"},
         {"field": "span", "title": "Range"},
-        {"field": "told", "title": by.title},
+        {"field": "text", "title": by.title},
     ]
     layers: list[Spec] = [
         {
@@ -69,21 +82,35 @@ def by_range(title: str, found: Sequence[Slice], spans: Sequence[str], names: Ma
 
 
 def error_cdf(title: str, curves: Mapping[str, ErrorCurve], names: Mapping[str, str]) -> Spec:
-    """Distribution of the absolute errors, one curve for each detector, with its percentiles."""
+    """Distribution of the absolute errors, one curve for each detector, with its percentiles.
+
+    Parameters
+    ----------
+    title : str
+    curves : mapping of str to ErrorCurve
+        By detector; at least one.
+    names : mapping of str to str
+        Labels of detectors.
+    """
     *ends_m, logarithmic = error_axis(list(curves.values()))
     least, far = (100 * end_m for end_m in ends_m)
     rows: list[Spec] = []
     points: list[Spec] = []
     for detector, curve in curves.items():
         known = [("median", curve.p50_m, 0.5), ("P90", curve.p90_m, 0.9), ("P95", curve.p95_m, 0.95)]
-        told = ", ".join(f"{what} {number(value, 1, 100)}" for what, value, _ in known)
+        percentiles = ", ".join(f"{what} {number(value, 1, 100)}" for what, value, _ in known)
         label = names[detector]
         rows += [
             {"detector": label, "error": max(100 * error_m, least), "share": share}
             for error_m, share in zip(curve.error_m.tolist(), curve.share.tolist(), strict=True)
         ]
         points += [
-            {"detector": label, "error": 100 * value, "share": at, "told": f"{told} cm, n = {curve.n} detections"}
+            {
+                "detector": label,
+                "error": 100 * value,
+                "share": at,
+                "text": f"{percentiles} cm, n = {curve.n} detections",
+            }
             for _, value, at in known
             if not math.isnan(value)
         ]
@@ -97,7 +124,7 @@ def error_cdf(title: str, curves: Mapping[str, ErrorCurve], names: Mapping[str, 
         scale={"domain": [0, 1]},
         axis={"values": list(SHARES), "format": ".2~f", "labelOverlap": False},
     )
-    tooltip = [{"field": "detector", "title": "Detector"}, {"field": "told", "title": "Absolute error"}]
+    tooltip = [{"field": "detector", "title": "Detector"}, {"field": "text", "title": "Absolute error"}]
     layers: list[Spec] = [
         {
             "mark": {"type": "line", "strokeWidth": 1.8, "clip": True},

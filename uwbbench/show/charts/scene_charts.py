@@ -16,13 +16,24 @@ NEAR = {True: "within the gate", False: "elsewhere"}
 
 
 def radargram(title: str, case: Case, image: tuple[str, float] | None, names: Mapping[str, str]) -> Spec:
-    """A capture over time and range: samples where they are at hand, true ranges, detections of a chosen detector."""
+    """A capture over time and range: samples where they are at hand, true ranges, detections of a chosen detector.
+
+    Parameters
+    ----------
+    title : str
+    case : Case
+    image : (str, float) or None
+        ``data:`` address of the samples as a picture, and the range in metres at its upper edge; None where the capture
+        is not at hand.
+    names : mapping of str to str
+        Labels of detectors.
+    """
     truth = [
         {"time": time, "range": range_m, "object": f"{place} {one.name}"}
         for place, one in enumerate(case.ranges)
         for time, range_m in zip(_nulls(case.time_s), _nulls(one.ahead_m), strict=True)
     ]
-    found = [
+    detections = [
         {"detector": names[marks.detector], "time": time, "range": range_m, "near": NEAR[near]}
         for marks in case.marks
         for time, range_m, near in zip(_nulls(marks.time_s), _nulls(marks.range_m), marks.near.tolist(), strict=True)
@@ -34,8 +45,8 @@ def radargram(title: str, case: Case, image: tuple[str, float] | None, names: Ma
     y = axis("range", "Range (m)", scale={"domain": [0, far], "nice": False})
     layers: list[Spec] = []
     if image is not None:
-        whole: Spec = {"width": {"expr": "width"}, "height": {"expr": "height"}, "x": 0, "y": 0, "aspect": False}
-        mark = {"type": "image", "url": image[0], "align": "left", "baseline": "top", **whole}
+        stretched: Spec = {"width": {"expr": "width"}, "height": {"expr": "height"}, "x": 0, "y": 0, "aspect": False}
+        mark = {"type": "image", "url": image[0], "align": "left", "baseline": "top", **stretched}
         layers.append({"data": {"values": [{}]}, "mark": mark})
     layers += [
         {
@@ -53,7 +64,7 @@ def radargram(title: str, case: Case, image: tuple[str, float] | None, names: Ma
     ]
     layers.append(
         {
-            "data": {"values": found},
+            "data": {"values": detections},
             "transform": [{"filter": "datum.detector === detector"}],
             "mark": {"type": "point", "size": 9, "opacity": 0.95, "clip": True, "filled": True},
             "encoding": {"x": x, "y": y, **_nearness(), "tooltip": tooltip},
@@ -64,26 +75,34 @@ def radargram(title: str, case: Case, image: tuple[str, float] | None, names: Ma
 
 
 def top_view(title: str, case: Case, names: Mapping[str, str]) -> Spec:
-    """A capture from above: outlines, the robot's path, and the places of the detections of a chosen detector."""
+    """A capture from above: outlines, the robot's path, and the places of the detections of a chosen detector.
+
+    Parameters
+    ----------
+    title : str
+    case : Case
+    names : mapping of str to str
+        Labels of detectors.
+    """
     lines: list[Spec] = [
-        {"x": x, "y": y, "order": index, "thing": "robot path", "kind": "path"}
+        {"x": x, "y": y, "order": index, "line": "robot path", "kind": "path"}
         for index, (x, y) in enumerate(case.path_m.tolist())
     ]
     for place, outline in enumerate(case.outlines):
         points_m = outline.points_m if outline.moves else np.concatenate([outline.points_m, outline.points_m[:1]])
         kind = "structure" if outline.structure else "truth"
         lines += [
-            {"x": x, "y": y, "order": index, "thing": f"{place} {outline.name}", "kind": kind}
+            {"x": x, "y": y, "order": index, "line": f"{place} {outline.name}", "kind": kind}
             for index, (x, y) in enumerate(zip(_nulls(points_m[:, 0]), _nulls(points_m[:, 1]), strict=True))
         ]
-    found = [
+    detections = [
         {"detector": names[marks.detector], "x": x, "y": y, "near": NEAR[near]}
         for marks in case.marks
         for x, y, near in zip(_nulls(marks.x_m), _nulls(marks.y_m), marks.near.tolist(), strict=True)
         if x is not None and y is not None
     ]
-    every = [(row["x"], row["y"]) for row in [*lines, *found] if row["x"] is not None and row["y"] is not None]
-    across, up = limits([point[0] for point in every]), limits([point[1] for point in every])
+    corners = [(row["x"], row["y"]) for row in [*lines, *detections] if row["x"] is not None and row["y"] is not None]
+    across, up = limits([point[0] for point in corners]), limits([point[1] for point in corners])
     tall, middle = max(up[1] - up[0], (across[1] - across[0]) / 2.2), (up[0] + up[1]) / 2
     x = axis("x", "x (m)", scale={"domain": across, "nice": False, "zero": False})
     y = axis("y", "y (m)", scale={"domain": [middle - tall / 2, middle + tall / 2], "nice": False, "zero": False})
@@ -91,13 +110,13 @@ def top_view(title: str, case: Case, names: Mapping[str, str]) -> Spec:
         {
             "data": {"values": [line for line in lines if line["kind"] == kind]},
             "mark": {"type": "line", "style": kind, "clip": True},
-            "encoding": {"x": x, "y": y, "order": {"field": "order"}, "detail": {"field": "thing"}},
+            "encoding": {"x": x, "y": y, "order": {"field": "order"}, "detail": {"field": "line"}},
         }
         for kind in ("structure", "path", "truth")
     ]
     layers.append(
         {
-            "data": {"values": found},
+            "data": {"values": detections},
             "transform": [{"filter": "datum.detector === detector"}],
             "mark": {"type": "point", "size": 16, "opacity": 0.9, "filled": True, "clip": True},
             "encoding": {"x": x, "y": y, **_nearness()},

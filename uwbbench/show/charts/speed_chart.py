@@ -19,21 +19,21 @@ SIDES = ((12, -11), (12, 13), (-12, -11), (-12, 13), (12, -26), (12, 28), (-12, 
 """Places of a label beside its point, in pixels right and down, the best first."""
 
 
-def speed_against_error(title: str, found: Sequence[Point], names: Mapping[str, str], quantity: Quantity) -> Spec:
+def speed_against_error(title: str, points: Sequence[Point], names: Mapping[str, str], quantity: Quantity) -> Spec:
     """Chart of all detectors that were both timed and scored.
 
     Parameters
     ----------
     title : str
-    found : sequence of Point
+    points : sequence of Point
         At least one.
     names : mapping of str to str
         Labels of detectors.
     quantity : Quantity
         The metric.
     """
-    rows = [_row(point, names, quantity) for point in found]
-    frame_period = float(np.median([point.speed.deadline for point in found]))
+    rows = [_row(point, names, quantity) for point in points]
+    frame_period = float(np.median([point.speed.deadline for point in points]))
     ends = [row[side] for row in rows for side in ("left", "right")]
     reach = [min(*ends, frame_period) / 1.25, max(*ends, frame_period) * 1.25]
     span = limits([row[side] for row in rows for side in ("low", "high")], share=0.12)
@@ -44,7 +44,7 @@ def speed_against_error(title: str, found: Sequence[Point], names: Mapping[str, 
 
     x = {"scale": {"type": "log", "domain": reach, "nice": False}, "axis": {"format": "~g"}}
     y = {"scale": {"domain": span, "zero": False, "nice": False}}
-    reference = found[0].speed.reference
+    reference = points[0].speed.reference
     across = axis("ratio", f"Time a frame, in times of {names.get(reference, reference)} (ratio, log)", **x)
     up = axis("value", quantity.axis, **y)
     series = Series(names, [row["detector"] for row in rows])
@@ -113,7 +113,7 @@ def _row(point: Point, names: Mapping[str, str], quantity: Quantity) -> Spec:
         "high": value if math.isnan(high) else high,
         "front": point.on_front,
         "label": f"{names[point.detector]}, P {probability(point.probability)}",
-        "error": quantity.told(point.error),
+        "error": quantity.in_full(point.error),
         "time": f"{number(speed.ratio, 3)} {ends}, {speed.captures} timed {plural}",
         "p50": f"{number(speed.p50_us, 0)} us on this machine",
         "chance": probability(point.probability),

@@ -1,4 +1,4 @@
-"""Colours and type of charts: one palette that colour-blind readers tell apart, on light and on dark paper."""
+"""Colours and type of charts: one palette that colour-blind readers can distinguish, on light and on dark paper."""
 
 from __future__ import annotations
 
@@ -15,7 +15,13 @@ FONT = "system-ui, -apple-system, 'Segoe UI', Roboto, 'Helvetica Neue', Arial, s
 
 
 def config(*, ink: str, soft: str, line: str, paper: str) -> dict[str, Any]:
-    """Vega-Lite configuration for one paper."""
+    """Vega-Lite configuration for one paper.
+
+    Parameters
+    ----------
+    ink, soft, line, paper : str
+        CSS colours of text, of secondary text and axes, of grid lines, and of the background.
+    """
     return {
         "font": FONT,
         "background": None,

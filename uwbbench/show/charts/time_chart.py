@@ -10,7 +10,18 @@ from uwbbench.show.charts.chart import LINES, Series, Spec, axis, chart, deadlin
 
 
 def latency(title: str, times_us: Mapping[str, FloatArray], deadline_us: float, names: Mapping[str, str]) -> Spec:
-    """Share of calls that take as long as a time or longer, one curve for each detector."""
+    """Share of calls that take as long as a time or longer, one curve for each detector.
+
+    Parameters
+    ----------
+    title : str
+    times_us : mapping of str to (calls,) array
+        Times of single calls by detector, in microseconds; at least one.
+    deadline_us : float
+        Frame period of the radar.
+    names : mapping of str to str
+        Labels of detectors.
+    """
     rows = []
     for detector, times in times_us.items():
         slow_us, share = tail_curve(times)
@@ -19,7 +30,7 @@ def latency(title: str, times_us: Mapping[str, FloatArray], deadline_us: float, 
                 "detector": names[detector],
                 "time": time,
                 "share": part,
-                "told": f"{part:.2%} of {len(times)} calls take {time:.0f} us or longer",
+                "text": f"{part:.2%} of {len(times)} calls take {time:.0f} us or longer",
             }
             for time, part in zip(slow_us.tolist(), share.tolist(), strict=True)
         ]
@@ -34,7 +45,7 @@ def latency(title: str, times_us: Mapping[str, FloatArray], deadline_us: float, 
         scale={"type": "log", "domain": [least / 1.2, 1.0], "nice": False},
         axis={"format": "~%", "tickCount": 3},
     )
-    tooltip = [{"field": "detector", "title": "Detector"}, {"field": "told", "title": "Calls"}]
+    tooltip = [{"field": "detector", "title": "Detector"}, {"field": "text", "title": "Calls"}]
     layers: list[Spec] = [
         deadline(deadline_us, f"frame period {deadline_us:.0f} us", x),
         {

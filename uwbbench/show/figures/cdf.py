@@ -13,7 +13,7 @@ from uwbbench.api.text import printable
 from uwbbench.measure.accuracy.scoring import ScoringRules, outcomes
 from uwbbench.results.curves import ErrorCurve, error_axis, error_curve
 from uwbbench.show.figures import style
-from uwbbench.show.figures.source import Found, about
+from uwbbench.show.figures.source import Result, about
 from uwbbench.show.text.numbers import number
 
 if TYPE_CHECKING:
@@ -25,14 +25,14 @@ MOST_POINTS = 10_000
 """Points of a curve at most: no printer shows more steps."""
 
 
-def draw_cdf(founds: list[Found], rules: ScoringRules, table: str = "filtering") -> Figure:
+def draw_cdf(results: list[Result], rules: ScoringRules, table: str = "filtering") -> Figure:
     """Draw the share of detections whose absolute error stays below each value, one curve a detector.
 
     Captures of one dataset are pooled; datasets, and measured and simulated captures, have panels of their own.
 
     Parameters
     ----------
-    founds : list of Found
+    results : list of Result
     rules : ScoringRules
     table : {"filtering", "mapping"}
 
@@ -47,17 +47,17 @@ def draw_cdf(founds: list[Found], rules: ScoringRules, table: str = "filtering")
     if table not in tables:
         raise ConfigError(f"no table '{table}'.{nearest(table, tables)}")
     panels: dict[tuple[str, str, bool], dict[str, list[Outcome]]] = defaultdict(lambda: defaultdict(list))
-    for found in founds:
-        made = outcomes(found.detections, found.header, rules)
-        if table in made:
-            group = (found.dataset, found.header.source, made[table].exhaustive)
-            panels[group][found.detector].append(made[table])
+    for result in results:
+        by_table = outcomes(result.detections, result.header, rules)
+        if table in by_table:
+            group = (result.dataset, result.header.source, by_table[table].exhaustive)
+            panels[group][result.detector].append(by_table[table])
     curves = {
         group: {name: error_curve(parts, MOST_POINTS) for name, parts in members.items()}
         for group, members in panels.items()
     }
     if not any(curve for members in curves.values() for curve in members.values()):
-        raise ScoringError(f"{founds[0].detector}: no detection has an error in the table '{table}'")
+        raise ScoringError(f"{results[0].detector}: no detection has an error in the table '{table}'")
     with style.styled():
         crowded = max(map(len, curves.values())) > BESIDE
         columns = 1 if crowded else min(len(curves), 2)
@@ -73,7 +73,7 @@ def draw_cdf(founds: list[Found], rules: ScoringRules, table: str = "filtering")
             axes.set_visible(False)
         for axes in grid[::columns]:
             axes.set_ylabel("Share of detections")
-        style.caption(drawn, _sentences(founds, rules, table))
+        style.caption(drawn, _sentences(results, rules, table))
     return drawn
 
 
@@ -107,18 +107,18 @@ def _panel(axes: Any, curves: dict[str, ErrorCurve | None]) -> None:
     style.legend(axes, handles, labels, title="median, P90, P95", title_fontsize=7.0, **where)
 
 
-def _sentences(founds: list[Found], rules: ScoringRules, table: str) -> list[str]:
-    named = list(dict.fromkeys(about(found.header) for found in founds))
+def _sentences(results: list[Result], rules: ScoringRules, table: str) -> list[str]:
+    named = list(dict.fromkeys(about(result.header) for result in results))
     if len(named) > 2:
         named = [f"{len(named)} captures."]
     what = "range after filtering" if table == "filtering" else "distance to the outline after mapping"
     rule = f"Error of the {what}, scoring {rules.scoring}; circle: median, square: P90, diamond: P95."
-    partial = any(found.header.truth is not None and not found.header.truth.exhaustive for found in founds)
+    partial = any(result.header.truth is not None and not result.header.truth.exhaustive for result in results)
     gate = (
         f"Where the truth is not exhaustive: detections within {rules.gate_m:g} m of an object alone."
         if partial
         else ""
     )
-    detectors = list(dict.fromkeys(found.detector for found in founds))
+    detectors = list(dict.fromkeys(result.detector for result in results))
     who = f"Detector {detectors[0]}." if len(detectors) == 1 else ""
     return [*named, who, rule, gate]

@@ -10,7 +10,7 @@ import numpy as np
 from uwbbench.api.arrays import BoolArray
 from uwbbench.api.text import printable
 from uwbbench.show.figures import style
-from uwbbench.show.figures.source import Found
+from uwbbench.show.figures.source import Result
 from uwbbench.show.figures.topview import check_located, draw_scene, limits
 
 if TYPE_CHECKING:
@@ -34,31 +34,31 @@ class Panel:
     rows: BoolArray
 
 
-def panels(found: Found) -> list[Panel]:
+def panels(result: Result) -> list[Panel]:
     """All peaks; those left behind each group of filters; those in clusters.
 
     Filters that follow each other without another step in between share a panel, so that ``paper`` has five: all
     peaks, behind the filters of shape, of SNR-score, of phase difference with the selection, and clusters.
     """
-    peaks = found.candidates
-    steps = list(found.detections.chain)
+    peaks = result.candidates
+    steps = list(result.detections.chain)
     # A step drops peaks for good, so what is left behind it is what no step up to it has dropped.
     dropped_at = np.where(np.isnan(peaks["rejected_by"]), np.inf, peaks["rejected_by"])
     shown = [Panel("all peaks", np.ones(len(peaks), bool))]
     group: list[str] = []
     for place, label in enumerate(steps):
-        if label not in found.filters:
+        if label not in result.filters:
             continue
         group.append(label.removeprefix("filter.").removeprefix("select."))
-        if place + 1 == len(steps) or steps[place + 1] not in found.filters:
+        if place + 1 == len(steps) or steps[place + 1] not in result.filters:
             shown.append(Panel(", ".join(group), dropped_at > place))
             group = []
-    if "cluster" in found.detections:
+    if "cluster" in result.detections:
         shown.append(Panel("clusters", (peaks["retained"] == 1) & (peaks["cluster"] >= 0)))
     return shown
 
 
-def draw_pipeline(found: Found) -> Figure:
+def draw_pipeline(result: Result) -> Figure:
     """Draw one panel in x and y for each group of filters, coloured by SNR-score.
 
     Raises
@@ -68,9 +68,9 @@ def draw_pipeline(found: Found) -> Figure:
     StoreError
         If they come from a run that did not keep the peaks before the filters.
     """
-    peaks, header = found.candidates, found.header
-    check_located(peaks, header, found.detector)
-    shown = panels(found)
+    peaks, header = result.candidates, result.header
+    check_located(peaks, header, result.detector)
+    shown = panels(result)
     span_x, span_y = limits(header, peaks)
     score = peaks["score_db"]
     finite = score[np.isfinite(score)]
@@ -122,5 +122,5 @@ def draw_pipeline(found: Found) -> Figure:
         bar = spare.inset_axes((0.08, 0.5, 0.84, 0.07))
         drawn.colorbar(points, cax=bar, orientation="horizontal", label="SNR-score (dB)", extend="both")
         style.legend(spare, handles, labels, loc="upper center", ncols=2)
-        style.caption(drawn, [found.subject, "Numbers: peaks left behind the steps."])
+        style.caption(drawn, [result.subject, "Numbers: peaks left behind the steps."])
     return drawn

@@ -41,13 +41,13 @@ def draw_cir(capture: Capture, detector: Pipeline, frame: int | None = None) -> 
     ConfigError
         If the capture has no such frame, or it is invalid.
     """
-    found = from_capture(capture, detector)
-    frame = _chosen(capture, found.detections, frame)
+    result = from_capture(capture, detector)
+    frame = _chosen(capture, result.detections, frame)
     block = next(b for b in detector.signals(capture) if b.frames.first <= frame < b.frames.first + len(b.frames))
     row = frame - block.frames.first
     if not block.frames.valid[row]:
         raise ConfigError(f"capture '{capture.name}': frame {frame} holds samples that are not finite")
-    peaks = found.candidates.take(found.candidates.frame == frame)
+    peaks = result.candidates.take(result.candidates.frame == frame)
     zero = float(zero_tap(block, capture.radar)[0][row])
     interval_ns = capture.radar.sample_interval_s * 1e9
 
@@ -55,15 +55,15 @@ def draw_cir(capture: Capture, detector: Pipeline, frame: int | None = None) -> 
         drawn = style.figure(style.PAGE_IN, 4.4)
         upper, lower = drawn.subplots(2, 1, sharex=True, height_ratios=(3, 2))
         curve, start, name = _searched(block, row)
-        whole_ns = np.asarray((np.arange(capture.radar.taps) - zero) * interval_ns, np.float64)
-        delay_ns = whole_ns[start:]
+        all_ns = np.asarray((np.arange(capture.radar.taps) - zero) * interval_ns, np.float64)
+        delay_ns = all_ns[start:]
         amplitude = block.frames.amplitude[row]
         reference = float(amplitude.max()) or 1.0
         dots = {"marker": ".", "ms": 2.5} if len(curve) <= DOTTED_TAPS else {}
         handles: list[Any] = upper.plot(delay_ns, curve, color=style.BLACK, **dots)
         labels = ["response"]
-        lower.plot(whole_ns, _decibels(amplitude, reference), color=style.BLACK, **dots)
-        if whole_ns[0] <= 0.0 <= whole_ns[-1]:
+        lower.plot(all_ns, _decibels(amplitude, reference), color=style.BLACK, **dots)
+        if all_ns[0] <= 0.0 <= all_ns[-1]:
             lower.axvline(0.0, color=style.BLUE, ls="--")
             handles.append(upper.axvline(0.0, color=style.BLUE, ls="--"))
             labels.append("first path")
@@ -73,8 +73,8 @@ def draw_cir(capture: Capture, detector: Pipeline, frame: int | None = None) -> 
             labels.append("noise floor (RMS)")
         measures = _measures(upper, peaks, curve, start, delay_ns)
         peaks_ns = (peaks["tap"] - zero) * interval_ns
-        marks = _marks(upper, found.detections.chain, peaks, peaks_ns, _at(curve, peaks["tap"] - start))
-        _marks(lower, found.detections.chain, peaks, peaks_ns, _decibels(_at(amplitude, peaks["tap"]), reference))
+        marks = _marks(upper, result.detections.chain, peaks, peaks_ns, _at(curve, peaks["tap"] - start))
+        _marks(lower, result.detections.chain, peaks, peaks_ns, _decibels(_at(amplitude, peaks["tap"]), reference))
         for artist, label in [*measures, *marks]:
             handles.append(artist)
             labels.append(label)
@@ -83,20 +83,20 @@ def draw_cir(capture: Capture, detector: Pipeline, frame: int | None = None) -> 
         lower.set_ylabel("Amplitude (dB)")
         origin = "from transmission" if capture.radar.first_tap_delay_s is not None else "behind the first path"
         lower.set_xlabel(f"Delay {origin} (ns)")
-        lower.set_xlim(whole_ns[0], whole_ns[-1])
-        _range_axis(upper, capture, whole_ns)
+        lower.set_xlim(all_ns[0], all_ns[-1])
+        _range_axis(upper, capture, all_ns)
         style.legend(upper, handles, labels, loc="upper left", bbox_to_anchor=(1.01, 1.0), borderaxespad=0.0)
         time_s = capture.trajectory.timestamp_s[frame] - capture.trajectory.timestamp_s[0]
         where = f"Frame {frame} of {len(capture)}, {time_s:.2f} s after the first; dB relative to its strongest tap."
-        style.caption(drawn, [found.subject, where])
+        style.caption(drawn, [result.subject, where])
     return drawn
 
 
-def _chosen(capture: Capture, found: Detections, frame: int | None) -> int:
+def _chosen(capture: Capture, detections: Detections, frame: int | None) -> int:
     if not len(capture):
         raise ConfigError(f"capture '{capture.name}' has no frames")
     if frame is None:
-        known = np.unique(found.frame) if len(found) else found.processed
+        known = np.unique(detections.frame) if len(detections) else detections.processed
         if not len(known):
             raise ConfigError(f"capture '{capture.name}' has no valid frame")
         return int(known[np.argmin(np.abs(known - len(capture) // 2))])

@@ -14,7 +14,7 @@ from uwbbench.show.figures.cir import draw_cir
 from uwbbench.show.figures.environment import draw_map
 from uwbbench.show.figures.properties import draw_properties
 from uwbbench.show.figures.radargram import draw_radargram
-from uwbbench.show.figures.source import Found, from_capture, from_run, one_of, rules_of_run
+from uwbbench.show.figures.source import Result, from_capture, from_run, one_of, rules_of_run
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -74,6 +74,15 @@ def check_kind(kind: str, choices: Choices) -> None:
 def draw_capture(kind: str, capture: Capture, detector: Pipeline | None, choices: Choices) -> Figure:
     """Draw a capture, with a detector that runs on it now.
 
+    Parameters
+    ----------
+    kind : str
+        A key of :data:`KINDS`.
+    capture : Capture
+    detector : Pipeline or None
+        None is enough for ``radargram`` alone.
+    choices : Choices
+
     Raises
     ------
     ConfigError
@@ -89,7 +98,7 @@ def draw_capture(kind: str, capture: Capture, detector: Pipeline | None, choices
     gate_m = 0.20 if choices.gate_m is None else choices.gate_m
     # By name only: an unknown scoring is refused by the rules themselves.
     rules = ScoringRules(choices.scoring or "frame", gate_m)  # type: ignore[arg-type]
-    return _draw_found(kind, [from_capture(capture, detector)], rules, choices, capture.name)
+    return _draw_results(kind, [from_capture(capture, detector)], rules, choices, capture.name)
 
 
 def draw_run(
@@ -102,6 +111,16 @@ def draw_run(
 ) -> Figure:
     """Draw what a run folder holds; nothing is run.
 
+    Parameters
+    ----------
+    kind : str
+        A key of :data:`KINDS`.
+    folder : RunFolder
+    choices : Choices
+        The scoring is the run's first, and the gate the run's, unless chosen.
+    detector, capture, dataset : str, optional
+        Names; everything in the run by default.
+
     Raises
     ------
     ConfigError
@@ -113,16 +132,16 @@ def draw_run(
     rules = rules_of_run(folder, choices.scoring)
     if choices.gate_m is not None:
         rules = ScoringRules(rules.scoring, choices.gate_m, rules.region, rules.strongest)
-    return _draw_found(kind, from_run(folder, detector, capture, dataset), rules, choices, str(folder.path))
+    return _draw_results(kind, from_run(folder, detector, capture, dataset), rules, choices, str(folder.path))
 
 
-def _draw_found(kind: str, founds: list[Found], rules: ScoringRules, choices: Choices, where: str) -> Figure:
+def _draw_results(kind: str, results: list[Result], rules: ScoringRules, choices: Choices, where: str) -> Figure:
     if kind == "cdf":
-        return draw_cdf(founds, rules, choices.table or "filtering")
+        return draw_cdf(results, rules, choices.table or "filtering")
     if kind == "properties":
-        detectors = list(dict.fromkeys(found.detector for found in founds))
+        detectors = list(dict.fromkeys(result.detector for result in results))
         if len(detectors) > 1:
             raise ConfigError(f"{where}: choose one with --detector: {', '.join(detectors)}")
-        return draw_properties(founds, rules.gate_m)
-    found = one_of(founds, where)
-    return draw_map(found) if kind == "map" else draw_pipeline(found)
+        return draw_properties(results, rules.gate_m)
+    result = one_of(results, where)
+    return draw_map(result) if kind == "map" else draw_pipeline(result)

@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from uwbbench.show.figures import style
-from uwbbench.show.figures.source import Found
+from uwbbench.show.figures.source import Result
 from uwbbench.show.figures.topview import check_located, draw_scene, limits
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-def draw_map(found: Found) -> Figure:
+def draw_map(result: Result) -> Figure:
     """Draw the clusters, each in its own colour and marker, the points outside of them, outlines and path.
 
     Raises
@@ -22,8 +22,8 @@ def draw_map(found: Found) -> Figure:
     ConfigError
         If the detections have no positions.
     """
-    points, header = found.detections, found.header
-    check_located(points, header, found.detector)
+    points, header = result.detections, result.header
+    check_located(points, header, result.detector)
     span_x, span_y = limits(header, points)
     with style.styled():
         shape = (span_y[1] - span_y[0]) / (span_x[1] - span_x[0])
@@ -60,5 +60,5 @@ def draw_map(found: Found) -> Figure:
         axes.margins(0.05)
         style.legend(axes, handles, labels, loc="upper left", bbox_to_anchor=(1.01, 1.0), borderaxespad=0.0)
         more = f"The {len(names) - 12} later clusters are not in the legend." if len(names) > 12 else ""
-        style.caption(drawn, [found.subject, f"Points: {len(points)}. Clusters: {len(names)}.", more])
+        style.caption(drawn, [result.subject, f"Points: {len(points)}. Clusters: {len(names)}.", more])
     return drawn

@@ -47,7 +47,7 @@ def draw_flip(flip: Flip, region: Region, roots: Sequence[Path]) -> tuple[Figure
         Why the response is not shown; empty if it is.
     """
     unit = flip.unit
-    scene = Scene.of(unit.found[0], unit.header)
+    scene = Scene.of(unit.detections[0], unit.header)
     true_m = np.where(scene.visible(region), scene.sight.range_m, np.nan)
     capture, missing = _at_hand(flip, roots)
     with style.styled():
@@ -63,8 +63,10 @@ def draw_flip(flip: Flip, region: Region, roots: Sequence[Path]) -> tuple[Figure
 
 
 def _errors(flip: Flip) -> str:
-    told = ["nothing" if np.isnan(e) else number(e, 1, 100.0, "cm") for e in (flip.error_before_m, flip.error_after_m)]
-    return f"Largest error before: {told[0]}; after: {told[1]}."
+    errors = [
+        "nothing" if np.isnan(e) else number(e, 1, 100.0, "cm") for e in (flip.error_before_m, flip.error_after_m)
+    ]
+    return f"Largest error before: {errors[0]}; after: {errors[1]}."
 
 
 def _at_hand(flip: Flip, roots: Sequence[Path]) -> tuple[Capture | None, str]:
@@ -88,8 +90,8 @@ def _response(axes: Axes, capture: Capture, flip: Flip, true_m: FloatArray) -> N
     for at in true_m[np.isfinite(true_m)]:
         handles.append(axes.axvline(at, color=style.GREEN, linewidth=2.0))
         names.append("true range")
-    for found, (name, colour, marker) in zip(flip.unit.found, SIDES, strict=True):
-        here = found.range_m[found.frame == flip.frame]
+    for detections, (name, colour, marker) in zip(flip.unit.detections, SIDES, strict=True):
+        here = detections.range_m[detections.frame == flip.frame]
         if len(here):
             height = np.interp(here, range_m, level_db)
             handles += axes.plot(here, height, marker, color=colour, fillstyle="none", markersize=7)
@@ -105,9 +107,11 @@ def _around(axes: Axes, flip: Flip, true_m: FloatArray) -> None:
     frames: IntArray = np.arange(start, stop, dtype=np.int64)
     lines = axes.plot(frames, true_m[start:stop], color=style.GREEN, linewidth=2.0)
     handles, names = lines[:1], ["true range"][: len(lines[:1])]
-    for found, (name, colour, marker) in zip(flip.unit.found, SIDES, strict=True):
-        inside = (found.frame >= start) & (found.frame < stop)
-        handles += axes.plot(found.frame[inside], found.range_m[inside], marker, color=colour, fillstyle="none")
+    for detections, (name, colour, marker) in zip(flip.unit.detections, SIDES, strict=True):
+        inside = (detections.frame >= start) & (detections.frame < stop)
+        handles += axes.plot(
+            detections.frame[inside], detections.range_m[inside], marker, color=colour, fillstyle="none"
+        )
         names.append(name)
     handles.append(axes.axvline(flip.frame, color=style.GREY, linestyle=":"))
     names.append(f"frame {flip.frame}")

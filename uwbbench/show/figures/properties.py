@@ -11,7 +11,7 @@ from uwbbench.api.arrays import FloatArray
 from uwbbench.api.detections import Detections
 from uwbbench.api.errors import ConfigError, ScoringError
 from uwbbench.show.figures import style
-from uwbbench.show.figures.source import Found, about
+from uwbbench.show.figures.source import Result, about
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -22,12 +22,12 @@ BIN_M, LEAST = 0.2, 5
 PROPERTIES = {"prominence": "Prominence", "width_taps": "Width (taps)"}
 
 
-def draw_properties(founds: list[Found], gate_m: float = 0.20) -> Figure:
+def draw_properties(results: list[Result], gate_m: float = 0.20) -> Figure:
     """Draw prominence and width of every peak near an obstacle, before the filters where they are known.
 
     Parameters
     ----------
-    founds : list of Found
+    results : list of Result
         One detector on one or more captures.
     gate_m : float
         Largest difference between the range of a peak and that of the obstacle it is taken for.
@@ -40,13 +40,13 @@ def draw_properties(founds: list[Found], gate_m: float = 0.20) -> Figure:
         If the detector measures neither, or no peak lies near an obstacle.
     """
     points: dict[tuple[str, str], list[FloatArray]] = defaultdict(list)
-    for found in founds:
-        number = found.header.radar.channel
+    for result in results:
+        number = result.header.radar.channel
         channel = f"channel {number}" if number else ""
-        for material, rows in _near_obstacles(found, gate_m).items():
+        for material, rows in _near_obstacles(result, gate_m).items():
             points[channel, material].append(rows)
     if not points:
-        raise ConfigError(f"no peak of '{founds[0].detector}' lies within {gate_m:g} m of an obstacle in range")
+        raise ConfigError(f"no peak of '{results[0].detector}' lies within {gate_m:g} m of an obstacle in range")
     columns = sorted({channel for channel, _ in points})
     materials = sorted({material for _, material in points})
     with style.styled():
@@ -79,38 +79,38 @@ def draw_properties(founds: list[Found], gate_m: float = 0.20) -> Figure:
         style.legend(grid[0, -1], handles, materials, loc="upper right")
         count = sum(len(rows) for parts in points.values() for rows in parts)
         text = f"{count} peaks within {gate_m:g} m of an obstacle; lines: running medians over {BIN_M:g} m."
-        style.caption(drawn, [*_subjects(founds), f"Detector {founds[0].detector}.", text])
+        style.caption(drawn, [*_subjects(results), f"Detector {results[0].detector}.", text])
     return drawn
 
 
-def _subjects(founds: list[Found]) -> list[str]:
-    named = list(dict.fromkeys(about(found.header) for found in founds))
+def _subjects(results: list[Result]) -> list[str]:
+    named = list(dict.fromkeys(about(result.header) for result in results))
     if len(named) <= 3:
         return named
-    simulated = sum(found.header.source == "simulated" for found in founds)
-    return [f"{len(founds)} captures, {simulated} of them SIMULATED."]
+    simulated = sum(result.header.source == "simulated" for result in results)
+    return [f"{len(results)} captures, {simulated} of them SIMULATED."]
 
 
-def _near_obstacles(found: Found, gate_m: float) -> dict[str, FloatArray]:
+def _near_obstacles(result: Result, gate_m: float) -> dict[str, FloatArray]:
     """Distance, prominence and width (n, 3) of the peaks that are taken for obstacles of each material."""
-    header, peaks = found.header, found.detections
+    header, peaks = result.header, result.detections
     if header.truth is None:
         raise ScoringError(f"capture '{header.name}' has no ground truth, so the distances of its peaks are unknown")
     known = peaks.candidates
     peaks = peaks if known is None else known
     missing = [name for name in (*PROPERTIES, "range_m") if len(peaks) and name not in peaks]
     if missing:
-        raise ConfigError(f"detector '{found.detector}' does not measure {' and '.join(missing)} of its peaks")
+        raise ConfigError(f"detector '{result.detector}' does not measure {' and '.join(missing)} of its peaks")
     sight = header.truth.seen_from(header.radar, header.trajectory)
     error_m = np.abs(peaks["range_m"][:, None] - sight.range_m[peaks.frame])
     error_m = np.where(np.isnan(error_m) | sight.occluded[peaks.frame], np.inf, error_m)
     rows: dict[str, list[FloatArray]] = defaultdict(list)
-    for column, thing in enumerate(header.truth.objects):
+    for column, obstacle in enumerate(header.truth.objects):
         mine = (error_m[:, column] <= gate_m) & (error_m[:, column] == error_m.min(axis=1, initial=np.inf))
-        if mine.any() and not thing.structure:
+        if mine.any() and not obstacle.structure:
             chosen = _one_a_frame(peaks.take(mine), error_m[mine, column])
             distance_m = sight.range_m[chosen.frame, column]
-            rows[thing.material].append(np.stack([distance_m, *(chosen[name] for name in PROPERTIES)], axis=1))
+            rows[obstacle.material].append(np.stack([distance_m, *(chosen[name] for name in PROPERTIES)], axis=1))
     return {material: np.concatenate(parts) for material, parts in rows.items()}
 
 

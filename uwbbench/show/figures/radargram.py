@@ -42,8 +42,8 @@ def draw_radargram(capture: Capture, detector: Pipeline | None = None) -> Figure
     """
     if not len(capture):
         raise ConfigError(f"capture '{capture.name}' has no frames")
-    found = None if detector is None else detector.run(capture)
-    if found is not None and len(found) and "range_m" not in found:
+    detections = None if detector is None else detector.run(capture)
+    if detections is not None and len(detections) and "range_m" not in detections:
         raise ConfigError("the detections have no range_m; add the stage 'range' to the detector")
     range_m = np.linspace(0.0, capture.radar.window_m, min(ROWS, 4 * capture.radar.taps))
     shown = np.arange(0, len(capture), _step(len(capture)), dtype=np.int64)
@@ -65,9 +65,9 @@ def draw_radargram(capture: Capture, detector: Pipeline | None = None) -> Figure
         axes.grid(visible=False)
         drawn.colorbar(mesh, ax=axes, label="Amplitude (dB below the strongest)", pad=0.01, extend="min")
         handles, labels = _truth(axes, capture)
-        if found is not None:
-            handles.append(_detections(axes, capture, found))
-            labels.append(f"detections ({len(found)})")
+        if detections is not None:
+            handles.append(_detections(axes, capture, detections))
+            labels.append(f"detections ({len(detections)})")
         axes.set_xlabel("Time (s)")
         axes.set_ylabel("Range (m)")
         axes.set_xlim(*_edges(time_s)[[0, -1]])
@@ -114,8 +114,8 @@ def _truth(axes: Axes, header: CaptureHeader) -> tuple[list[Any], list[str]]:
     return handles, labels
 
 
-def _detections(axes: Axes, header: CaptureHeader, found: Detections) -> Any:
+def _detections(axes: Axes, header: CaptureHeader, detections: Detections) -> Any:
     time_s = header.trajectory.timestamp_s - header.trajectory.timestamp_s[0]
-    crowded = len(found) > 3 * len(header)
+    crowded = len(detections) > 3 * len(header)
     look: dict[str, Any] = {"ms": 1.2 if crowded else 2.4, "mew": 0.0, "alpha": 0.6 if crowded else 0.9}
-    return axes.plot(time_s[found.frame], found.range_m, "o", color=style.VERMILION, zorder=4, **look)[0]
+    return axes.plot(time_s[detections.frame], detections.range_m, "o", color=style.VERMILION, zorder=4, **look)[0]

@@ -18,7 +18,7 @@ from uwbbench.run.folder import RunFolder
 
 
 @dataclass(frozen=True)
-class Found:
+class Result:
     """What one detector found on one capture.
 
     Attributes
@@ -70,17 +70,28 @@ def about(header: CaptureHeader) -> str:
     return f"{kind} {header.name}{channel}{several}."
 
 
-def from_capture(capture: Capture, detector: Pipeline) -> Found:
+def from_capture(capture: Capture, detector: Pipeline) -> Result:
     """Run a detector on a capture, keeping the peaks before its filters."""
     detections = detector.run(capture, candidates=True)
     steps = [(step.label, step.use) for step in detector.config.steps]
-    return Found(capture.header, detector.name, "", detections, _filters(steps))
+    return Result(capture.header, detector.name, "", detections, _filters(steps))
 
 
 def from_run(
     folder: RunFolder, detector: str | None = None, capture: str | None = None, dataset: str | None = None
-) -> list[Found]:
+) -> list[Result]:
     """Stored detections of a run, of all detectors, captures and datasets unless some are named.
+
+    Parameters
+    ----------
+    folder : RunFolder
+    detector, capture, dataset : str, optional
+        Names.
+
+    Returns
+    -------
+    list of Result
+        In the order of the run's detectors, then by dataset and capture.
 
     Raises
     ------
@@ -96,7 +107,7 @@ def from_run(
     }
     order = list(steps)
     return [
-        Found(
+        Result(
             header=folder.header(entry.capture_id),
             detector=entry.detector,
             dataset=entry.dataset,
@@ -123,7 +134,7 @@ def rules_of_run(folder: RunFolder, scoring: str | None) -> ScoringRules:
     return rules[scoring] if scoring in rules else next(iter(rules.values()))
 
 
-def one_of(founds: list[Found], where: str) -> Found:
+def one_of(results: list[Result], where: str) -> Result:
     """The only one, for a kind of picture that shows one detector on one capture.
 
     Raises
@@ -132,17 +143,17 @@ def one_of(founds: list[Found], where: str) -> Found:
         If there are several.
     """
     for option, names in (
-        ("--detector", _distinct(founds, lambda found: found.detector)),
-        ("--capture", _distinct(founds, lambda found: found.header.name)),
-        ("--dataset", _distinct(founds, lambda found: found.dataset)),
+        ("--detector", _distinct(results, lambda result: result.detector)),
+        ("--capture", _distinct(results, lambda result: result.header.name)),
+        ("--dataset", _distinct(results, lambda result: result.dataset)),
     ):
         if len(names) > 1:
             raise ConfigError(f"{where}: choose one with {option}: {', '.join(names)}")
-    return founds[0]
+    return results[0]
 
 
-def _distinct(founds: list[Found], key: Callable[[Found], str]) -> list[str]:
-    return list(dict.fromkeys(map(key, founds)))
+def _distinct(results: list[Result], key: Callable[[Result], str]) -> list[str]:
+    return list(dict.fromkeys(map(key, results)))
 
 
 def _filters(steps: list[tuple[str, str]]) -> frozenset[str]:

@@ -1,4 +1,4 @@
-"""How every picture looks: print sizes, serif type, colours that colour-blind readers tell apart, and plain text.
+"""How every picture looks: print sizes, serif type, colours that colour-blind readers can distinguish, and plain text.
 
 Sizes are those of a two-column paper: 3.5 inches a column, 7.16 the page, type of 7 to 8 points. Matplotlib is
 imported here alone before a picture is drawn, so that it stays an extra.
@@ -119,6 +119,16 @@ def legend(axes: Axes, handles: Sequence[Any], labels: Sequence[str], **where: A
     """Legend of the given handles.
 
     A label that starts with an underscore is shown too, which matplotlib would leave out.
+
+    Parameters
+    ----------
+    axes : Axes
+    handles : sequence of Artist
+        No legend is drawn where there are none.
+    labels : sequence of str
+        One for each handle.
+    **where
+        Keywords of :meth:`matplotlib.axes.Axes.legend`, such as its place.
     """
     shown = [f"\u200b{printable(label)}" if label.startswith("_") else printable(label) for label in labels]
     if handles:

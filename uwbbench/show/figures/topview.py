@@ -47,18 +47,26 @@ def draw_scene(axes: Axes, header: CaptureHeader) -> tuple[list[Any], list[str]]
     return handles, labels
 
 
-def limits(header: CaptureHeader, found: Detections) -> tuple[tuple[float, float], tuple[float, float]]:
+def limits(header: CaptureHeader, detections: Detections) -> tuple[tuple[float, float], tuple[float, float]]:
     """Span in x and in y that holds path, outlines and points."""
-    points = [header.trajectory.position_m[:, :2], np.stack([found["x_m"], found["y_m"]], axis=1)]
+    points = [header.trajectory.position_m[:, :2], np.stack([detections["x_m"], detections["y_m"]], axis=1)]
     points += [outline.points_m for outline in outlines(header)]
-    every = np.concatenate(points)
-    every = every[np.isfinite(every).all(axis=1)]
-    low, high = every.min(axis=0) - MARGIN_M, every.max(axis=0) + MARGIN_M
+    located = np.concatenate(points)
+    located = located[np.isfinite(located).all(axis=1)]
+    low, high = located.min(axis=0) - MARGIN_M, located.max(axis=0) + MARGIN_M
     return (float(low[0]), float(high[0])), (float(low[1]), float(high[1]))
 
 
-def check_located(found: Detections, header: CaptureHeader, detector: str) -> None:
+def check_located(detections: Detections, header: CaptureHeader, detector: str) -> None:
     """Refuse detections without a place in the world.
+
+    Parameters
+    ----------
+    detections : Detections
+    header : CaptureHeader
+        Capture that they belong to.
+    detector : str
+        Name for the message.
 
     Raises
     ------
@@ -67,7 +75,7 @@ def check_located(found: Detections, header: CaptureHeader, detector: str) -> No
     """
     if not len(header):
         raise ConfigError(f"capture '{header.name}' has no frames")
-    if "x_m" not in found:
+    if "x_m" not in detections:
         sts = "" if header.radar.has_sts else "; the capture has no STS responses, from which an azimuth would come"
         raise ConfigError(
             f"detector '{detector}' gives no positions on capture '{header.name}'{sts}. "

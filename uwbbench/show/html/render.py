@@ -3,7 +3,7 @@
 Conventions
 -----------
 * A page is a template beside a script and a style sheet of its name, ``page/page.html`` with ``.js`` and ``.css``. They
-  stand in the page behind the script and style sheet of all pages.
+  follow in the page after the script and style sheet of all pages.
 * The content security policy names scripts and style by their hashes. Values are escaped by the template.
 """
 
@@ -55,7 +55,7 @@ def document(template: str, bundle: str = "", **values: Any) -> str:
 
 
 def embedded(value: Any) -> str:
-    """JSON that stands in a script element: no character in it can end the element or start a comment."""
+    """JSON for a script element: no character in it can end the element or start a comment."""
     from markupsafe import Markup
 
     text = json.dumps(plain(value), separators=(",", ":"), allow_nan=False)

@@ -20,7 +20,7 @@ COLOURS = ("#0072b2", "#009e73", "#cc79a7", "#56b4e9", "#e69f00")
 
 def capture(shown: CaptureHeader) -> str:
     """HTML of a capture: radar, frames, duration, truth, licence, and its samples over time and range."""
-    told = {
+    facts = {
         "radar": _radar(shown.radar),
         "frames": f"{len(shown)} of {shown.radar.taps} taps, {shown.duration_s:.2f} s",
         "receiver": _receiver(shown),
@@ -30,14 +30,19 @@ def capture(shown: CaptureHeader) -> str:
         "about": shown.description,
     }
     image = _radargram(shown) if isinstance(shown, Capture) else ""
-    return elements.frame("capture", shown.name, elements.facts(told), image, simulated=shown.source == "simulated")
+    return elements.frame("capture", shown.name, elements.facts(facts), image, simulated=shown.source == "simulated")
 
 
 def truth(shown: Truth) -> str:
     """HTML of ground truth: its objects, and whether they are all that is visible."""
     rows = [
-        (thing.name, thing.material, "structure" if thing.structure else "obstacle", _extent(thing.outline_m))
-        for thing in shown.objects[:MOST_OBJECTS]
+        (
+            obstacle.name,
+            obstacle.material,
+            "structure" if obstacle.structure else "obstacle",
+            _extent(obstacle.outline_m),
+        )
+        for obstacle in shown.objects[:MOST_OBJECTS]
     ]
     left = len(shown.objects) - len(rows)
     more = [f"{left} more objects"] if left else []
@@ -55,11 +60,11 @@ def truth_line(shown: Truth | None) -> str:
     """
     if shown is None:
         return "none: can be detected on and timed, not scored"
-    names = ", ".join(f"{thing.name} ({thing.material})" for thing in shown.objects[:4])
+    names = ", ".join(f"{obstacle.name} ({obstacle.material})" for obstacle in shown.objects[:4])
     count = f"{len(shown.objects)} object{'' if len(shown.objects) == 1 else 's'}"
     rest = ", ..." if len(shown.objects) > 4 else ""
-    whole = "exhaustive" if shown.exhaustive else "not exhaustive: precision is undefined"
-    return f"{count}: {names}{rest}; {whole}" if names else f"no object; {whole}"
+    coverage = "exhaustive" if shown.exhaustive else "not exhaustive: precision is undefined"
+    return f"{count}: {names}{rest}; {coverage}" if names else f"no object; {coverage}"
 
 
 def _radar(radar: Radar) -> str:
@@ -80,7 +85,7 @@ def _receiver(shown: CaptureHeader) -> str:
 
 
 def _extent(outline_m: FloatArray) -> str:
-    """What an outline is, and its middle where it stands still."""
+    """What an outline is, and its middle where it does not move."""
     vertices = outline_m.shape[-2]
     shape = "point" if vertices == 1 else f"{vertices} vertices"
     if outline_m.ndim == 3:

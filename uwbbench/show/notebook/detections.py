@@ -23,7 +23,7 @@ _SHOWN = {
 def detections(shown: Detections) -> str:
     """HTML of detections: columns with units, the first rows, frames processed, and notes."""
     occupied = len(np.intersect1d(shown.frame, shown.processed))
-    told = {
+    facts = {
         "frames": f"{len(shown.processed)} processed, {len(shown.processed) - occupied} of them without a detection",
         "left behind": ", ".join(f"{step} {count}" for step, count in shown.chain.items()),
     }
@@ -33,7 +33,9 @@ def detections(shown: Detections) -> str:
     listed = elements.table(heads, rows, numbers=True)
     left = len(shown) - len(rows)
     more = [f"{left} more rows"] if left else []
-    return elements.frame("detections", len(shown), elements.facts(told), listed, elements.notes([*more, *shown.notes]))
+    return elements.frame(
+        "detections", len(shown), elements.facts(facts), listed, elements.notes([*more, *shown.notes])
+    )
 
 
 def _unit(name: str) -> tuple[str, str, float, int] | None:

@@ -16,9 +16,9 @@ from uwbbench.show.notebook import elements
 def detector(shown: Pipeline) -> str:
     """HTML of a detector: the chain in order; a step folds out into its parameters."""
     config = shown.config
-    told = {"about": config.description, "fidelity": config.fidelity, "citation": config.citation}
+    facts = {"about": config.description, "fidelity": config.fidelity, "citation": config.citation}
     steps = [_step(number, step) for number, step in enumerate(config.steps, start=1)]
-    return elements.frame("detector", shown.name, elements.facts(told), *steps)
+    return elements.frame("detector", shown.name, elements.facts(facts), *steps)
 
 
 def _step(number: int, step: Step) -> str:
@@ -28,13 +28,13 @@ def _step(number: int, step: Step) -> str:
         return elements.folded(f"{number}. <strong>{elements.text(step.label)}</strong>", elements.notes([error]))
     use = "" if step.use == step.label else f" ({elements.text(step.use)})"
     tags = ["optional: left out where the capture lacks what it needs"] if step.optional else []
-    tags += [f"put in for {step.implied_by}"] if step.implied_by else []
+    tags += [f"inserted for {step.implied_by}"] if step.implied_by else []
     tag = f" <em>{elements.text('; '.join(tags))}</em>" if tags else ""
     summary = f"{number}. <strong>{elements.text(step.label)}</strong>{use}: {elements.text(describe(stage))}{tag}"
     rows = [
         (
             name,
-            _value(step.params.get(name, field.default)),
+            _value(step.params.get(name, field.get_default(call_default_factory=True))),
             "set" if name in step.params else "default",
             without_markup(field.description or ""),
         )

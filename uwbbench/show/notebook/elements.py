@@ -10,7 +10,7 @@ from uwbbench.api.text import one_line
 LONGEST = 400
 """Characters of a name or value that are shown; no name, however long, pushes the rest away."""
 
-# Colours follow the notebook where it tells them (JupyterLab's variables), else the text around.
+# Colours follow the notebook where it defines them (JupyterLab's variables), else the text around.
 _STYLE = """
 .uwbbench{font-size:13px;line-height:1.45;max-width:60em;overflow-wrap:anywhere}
 .uwbbench .kind{opacity:.7}
@@ -41,20 +41,43 @@ def text(value: object) -> str:
 
 
 def frame(kind: str, name: object, *parts: str, simulated: bool = False) -> str:
-    """Everything about one object, under its kind and name."""
+    """Everything about one object, under its kind and name.
+
+    Parameters
+    ----------
+    kind : str
+        What it is, such as "capture".
+    name : object
+        Escaped here.
+    *parts : str
+        Markup already.
+    simulated : bool
+        Whether to say SIMULATED beside the name.
+    """
     label = ' <span class="simulated">SIMULATED</span>' if simulated else ""
     head = f'<div><span class="kind">{text(kind)}</span> <strong>{text(name)}</strong>{label}</div>'
     return f'<div class="uwbbench"><style>{_STYLE}</style>{head}{"".join(parts)}</div>'
 
 
-def facts(told: Mapping[str, object]) -> str:
+def facts(named: Mapping[str, object]) -> str:
     """Named facts, one a line; empty ones are left out."""
-    lines = [f"<tr><th scope='row'>{text(key)}</th><td>{text(value)}</td></tr>" for key, value in told.items() if value]
+    lines = [
+        f"<tr><th scope='row'>{text(key)}</th><td>{text(value)}</td></tr>" for key, value in named.items() if value
+    ]
     return f'<table class="facts"><tbody>{"".join(lines)}</tbody></table>' if lines else ""
 
 
 def table(columns: Sequence[str], rows: Iterable[Sequence[object]], numbers: bool = False) -> str:
-    """Table with a head; with ``numbers`` all columns but the first stand to the right."""
+    """Table with a head.
+
+    Parameters
+    ----------
+    columns : sequence of str
+    rows : iterable of sequence of object
+        As many cells as columns in each; escaped here.
+    numbers : bool
+        Align all columns but the first to the right.
+    """
     head = "".join(f"<th scope='col'>{text(column)}</th>" for column in columns)
     body = "".join(f"<tr>{_cells(row, numbers)}</tr>" for row in rows)
     return f'<table class="rows"><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>'

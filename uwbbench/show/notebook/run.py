@@ -11,8 +11,8 @@ def run(shown: Report) -> str:
     """HTML of a run: who is best on each dataset, with intervals, and what did not work."""
     manifest = shown.folder.manifest
     started = manifest["sessions"][-1]["started"]
-    told = {"folder": shown.folder.path, "about": shown.experiment["description"], "started": started}
-    parts = [elements.facts(told)]
+    facts = {"folder": shown.folder.path, "about": shown.experiment["description"], "started": started}
+    parts = [elements.facts(facts)]
     for sheet in (*Tables(shown).leaderboards(), *Tables(shown).failed()):
         table = elements.table(sheet.columns, sheet.rows, numbers=True)
         parts.append(f"<div>{elements.text(sheet.title)}</div>{table}{elements.notes(sheet.notes)}")

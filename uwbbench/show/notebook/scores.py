@@ -45,9 +45,9 @@ def _row(quantity: Quantity, estimate: Estimate) -> tuple[str, str, str, str]:
 
 
 def _counts(block: ScoreBlock) -> str:
-    told = [f"{block.tp} true, {block.fp} false, {block.fn} missed in {block.frames} scored frames"]
-    told += [f"{block.true_empty} frames with nothing to find and nothing found"] if block.true_empty else []
-    told += [f"{block.unprocessed} labelled frames were not processed"] if block.unprocessed else []
+    sentences = [f"{block.tp} true, {block.fp} false, {block.fn} missed in {block.frames} scored frames"]
+    sentences += [f"{block.true_empty} frames with nothing to find and nothing found"] if block.true_empty else []
+    sentences += [f"{block.unprocessed} labelled frames were not processed"] if block.unprocessed else []
     if not block.exhaustive:
-        told.append(f"truth not exhaustive: {block.unmatched} unmatched detections prove nothing")
-    return elements.notes(told)
+        sentences.append(f"truth not exhaustive: {block.unmatched} unmatched detections prove nothing")
+    return elements.notes(sentences)

@@ -66,19 +66,19 @@ class Content:
     @cached_property
     def boards(self) -> dict[Board, list[Scored]]:
         """What was scored on each board, in the order of the leaderboards."""
-        found: dict[Board, list[Scored]] = {}
+        boards: dict[Board, list[Scored]] = {}
         for about, _ in self.report.estimates:
-            found.setdefault((about["dataset"], about["source"], about["scoring"], about["table"]), [])
+            boards.setdefault((about["dataset"], about["source"], about["scoring"], about["table"]), [])
         for one in self.report.scored:
-            found[one.dataset, one.source, one.scoring, one.table].append(one)
-        return found
+            boards[one.dataset, one.source, one.scoring, one.table].append(one)
+        return boards
 
     @cached_property
     def slices(self) -> list[Slice]:
         """Every cut of every board."""
         known = {
-            ((about["dataset"], about["source"], about["scoring"], about["table"]), about["detector"]): found
-            for about, found in self.report.estimates
+            ((about["dataset"], about["source"], about["scoring"], about["table"]), about["detector"]): estimates
+            for about, estimates in self.report.estimates
         }
         return list(slices(self.report.scored, self.report.metrics, self.edges_m, self.settings, known))
 
@@ -89,23 +89,23 @@ class Content:
         for entry in self.report.entries:
             if (entry.kind, entry.status) == ("latency", "done"):
                 timed[entry.dataset, entry.detector].append(entry)
-        found: dict[str, dict[str, Speed]] = defaultdict(dict)
+        speeds: dict[str, dict[str, Speed]] = defaultdict(dict)
         for (dataset, detector), entries in timed.items():
             speed = speed_of(entries)
             if speed is not None:
-                found[dataset][detector] = speed
-        return found
+                speeds[dataset][detector] = speed
+        return speeds
 
     @cached_property
     def leaders(self) -> dict[tuple[str, str], str]:
         """First detector of each dataset and source, on its first board."""
-        found: dict[tuple[str, str], str] = {}
+        leaders: dict[tuple[str, str], str] = {}
         first = self.report.experiment["scoring"][0] if self.report.estimates else ""
         scorings = {about["scoring"] for about, _ in self.report.estimates}
         for about, _ in self.report.estimates:
             if about["table"] == "filtering" and (about["scoring"] == first or first not in scorings):
-                found.setdefault((about["dataset"], about["source"]), about["detector"])
-        return found
+                leaders.setdefault((about["dataset"], about["source"]), about["detector"])
+        return leaders
 
     def summary(self) -> list[str]:
         """One sentence for each dataset: who leads, how sure that is, and at what cost."""
@@ -142,7 +142,16 @@ class Content:
     # Charts ----------------------------------------------------------------------------------------------------
 
     def title(self, what: str, dataset: str, source: str) -> str:
-        """Title of a chart, which says so where captures are simulated."""
+        """Title of a chart, which says so where captures are simulated.
+
+        Parameters
+        ----------
+        what : str
+            What the chart shows.
+        dataset : str
+            Label in the run.
+        source : {"measured", "simulated"}
+        """
         return f"{what}: {self.datasets[dataset]}, {'SIMULATED' if source == 'simulated' else 'measured'}"
 
     def exhaustive(self, board: Board) -> bool:
@@ -159,37 +168,37 @@ class Content:
         for one in self.boards[board]:
             members[one.detector].append(one)
         speeds = self.speeds.get(board[0], {})
-        found = points(members, speeds, self.report.metrics[name], self.settings)
-        if not found:
+        placed = points(members, speeds, self.report.metrics[name], self.settings)
+        if not placed:
             return None
         quantity = self.quantities[name]
         title = self.title(f"Speed against {quantity.title}", board[0], board[1])
-        return speed_chart.speed_against_error(title, found, self.detectors, quantity)
+        return speed_chart.speed_against_error(title, placed, self.detectors, quantity)
 
     def by_range(self, board: Board, name: str) -> Spec | None:
         """A metric by range; None where there are no bins."""
-        found = [one for one in self.slices if one.board == board and (one.channel, one.material) == (ALL, ALL)]
-        found = [one for one in found if one.span != ALL and self._finds(board, one.detector)]
-        found = [one for one in found if not math.isnan(one.estimates[name].value)]
-        spans = [span for span in self.spans if any(one.span == span for one in found)]
+        shown = [one for one in self.slices if one.board == board and (one.channel, one.material) == (ALL, ALL)]
+        shown = [one for one in shown if one.span != ALL and self._finds(board, one.detector)]
+        shown = [one for one in shown if not math.isnan(one.estimates[name].value)]
+        spans = [span for span in self.spans if any(one.span == span for one in shown)]
         if not spans:
             return None
         quantity = self.quantities[name]
         title = self.title(f"{quantity.title} by range", board[0], board[1])
-        return error_charts.by_range(title, found, spans, self.detectors, quantity)
+        return error_charts.by_range(title, shown, spans, self.detectors, quantity)
 
     def _finds(self, board: Board, detector: str) -> bool:
         return any(one.outcome.tp.any() for one in self.boards[board] if one.detector == detector)
 
     def cdf(self, board: Board) -> Spec | None:
         """Distribution of the errors; None where there are none."""
-        found = {}
+        curves = {}
         for detector in self.report.detectors:
             curve = error_curve([one.outcome for one in self.boards[board] if one.detector == detector])
             if curve is not None:
-                found[detector] = curve
+                curves[detector] = curve
         return (
-            error_charts.error_cdf(self.title("Errors", board[0], board[1]), found, self.detectors) if found else None
+            error_charts.error_cdf(self.title("Errors", board[0], board[1]), curves, self.detectors) if curves else None
         )
 
     def _latencies(self) -> Iterator[Spec]:

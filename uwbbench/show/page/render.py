@@ -1,6 +1,6 @@
 """The page of a report, and its charts as pictures.
 
-The script of the charts (Vega, Vega-Lite and Vega-Embed) is bundled by vl-convert and stands in the page once.
+The script of the charts (Vega, Vega-Lite and Vega-Embed) is bundled by vl-convert and is in the page once.
 Expressions of charts are interpreted, not compiled, as the page's policy asks.
 """
 
@@ -111,8 +111,8 @@ def _counts(content: Content) -> str:
 
 
 def _tables(tables: Tables) -> list[tuple[str, str, list[Any], str]]:
-    """Sections made of tables: identifier, title, sheets, and what else stands there."""
-    found = [
+    """Sections made of tables: identifier, title, sheets, and what else the section holds."""
+    sections = [
         ("compared", "What was compared", list(tables.captures()), ""),
         ("paper", "By channel and material", list(tables.paper()), ""),
         ("latency", "Latency", list(tables.latency()), "latency"),
@@ -120,18 +120,18 @@ def _tables(tables: Tables) -> list[tuple[str, str, list[Any], str]]:
         ("limits", "Physical limits", list(tables.limits()), ""),
         ("failed", "Failed and not scored", list(tables.failed()), ""),
     ]
-    return [one for one in found if one[2] or one[0] not in ("limits", "paper")]
+    return [section for section in sections if section[2] or section[0] not in ("limits", "paper")]
 
 
 def _sections(content: Content, tables: list[tuple[str, str, list[Any], str]]) -> list[tuple[str, str]]:
-    found = [("summary", "Summary")]
+    sections = [("summary", "Summary")]
     if content.boards:
-        found += [("leaderboard", "Leaderboard"), ("pareto", "Speed against error")]
-        found += [("range", "By distance"), ("errors", "Errors")]
+        sections += [("leaderboard", "Leaderboard"), ("pareto", "Speed against error")]
+        sections += [("range", "By distance"), ("errors", "Errors")]
     if content.looks:
-        found.append(("captures-seen", "Best and worst"))
-    found += [(identifier, title) for identifier, title, *_ in tables]
-    return [*found, ("notes", "Notes"), ("manifest", "Manifest")]
+        sections.append(("captures-seen", "Best and worst"))
+    sections += [(identifier, title) for identifier, title, *_ in tables]
+    return [*sections, ("notes", "Notes"), ("manifest", "Manifest")]
 
 
 def _facts(session: dict[str, Any], experiment: dict[str, Any]) -> list[tuple[str, str]]:

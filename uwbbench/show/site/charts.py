@@ -1,4 +1,4 @@
-"""Charts of a site as SVG pictures, in the colours of the page that they stand in."""
+"""Charts of a site as SVG pictures, in the colours of the page around them."""
 
 from __future__ import annotations
 
@@ -22,7 +22,18 @@ WIDTH = 760
 
 
 def pareto(ranking: Ranking, metric: str, title: str, names: Mapping[str, str]) -> Spec | None:
-    """Speed against a metric, of the detectors that were timed and scored on all captures; None where there is none."""
+    """Speed against a metric, of the detectors that were timed and scored on all captures; None where there is none.
+
+    Parameters
+    ----------
+    ranking : Ranking
+    metric : str
+        One that its suite shows.
+    title : str
+        Of the dataset's section; says so where captures are simulated.
+    names : mapping of str to str
+        Labels of contenders by key.
+    """
     members = {one.contender.key: one.scored for one in ranking.standings if len(one.scored) == ranking.captures}
     speeds = {
         one.contender.key: replace(one.speed, reference=shown(one.speed.reference))
@@ -37,14 +48,23 @@ def pareto(ranking: Ranking, metric: str, title: str, names: Mapping[str, str]) 
 
 
 def errors(ranking: Ranking, title: str, names: Mapping[str, str]) -> Spec | None:
-    """Distribution of the errors; None where nothing was found."""
+    """Distribution of the errors; None where nothing was found.
+
+    Parameters
+    ----------
+    ranking : Ranking
+    title : str
+        Of the dataset's section; says so where captures are simulated.
+    names : mapping of str to str
+        Labels of contenders by key.
+    """
     curves = {one.contender.key: error_curve([part.outcome for part in one.scored]) for one in ranking.standings}
     known = {key: curve for key, curve in curves.items() if curve is not None}
     return error_charts.error_cdf(f"{title}: errors", known, names) if known else None
 
 
 def svg(spec: Spec) -> str:
-    """SVG of a chart; what a screen reader says of it stands beside it, not inside.
+    """SVG of a chart; what a screen reader says of it is beside it, not inside.
 
     Raises
     ------
@@ -53,8 +73,8 @@ def svg(spec: Spec) -> str:
     """
     with report_tools():
         import vl_convert
-    whole: dict[str, Any] = {**spec, "width": WIDTH, "config": PAGE}
-    drawn: str = vl_convert.vegalite_to_svg(whole)
+    complete: dict[str, Any] = {**spec, "width": WIDTH, "config": PAGE}
+    drawn: str = vl_convert.vegalite_to_svg(complete)
     plain = re.sub(r' (?:role|aria-[a-z]+)="[^"<>]*"', "", drawn)
     # vl-convert counts clips through its whole life; on a page they must be distinct, and the same every time.
     chart, places = digest(spec)[:8], dict[str, int]()

@@ -24,8 +24,8 @@ from uwbbench.show.text.wording import TABLES
 VERDICTS = {
     "differs": "differ",
     "equal": "practically equal",
-    "undecided": "not told apart",
-    "too few groups": "too few groups to tell",
+    "undecided": "not distinguished",
+    "too few groups": "too few groups to decide",
     "undefined": "undefined: one of them found nothing",
 }
 
@@ -112,15 +112,15 @@ class Content:
     @cached_property
     def sections(self) -> list[Section]:
         """Every dataset of every suite that anything could be scored on."""
-        found = []
+        sections = []
         for suite in self.suites:
             boards: dict[tuple[str, str], list[Ranking]] = {}
             for ranking in rankings(suite):
                 boards.setdefault(ranking.board[:2], []).append(ranking)
-            for (dataset, source), made in boards.items():
+            for (dataset, source), of_dataset in boards.items():
                 address = self.names.dataset_page(suite, dataset)
-                found.append(Section(suite, dataset, source, shown(dataset), address, tuple(made)))
-        return found
+                sections.append(Section(suite, dataset, source, shown(dataset), address, tuple(of_dataset)))
+        return sections
 
     def of_suite(self, suite: Suite) -> list[Section]:
         """Datasets of one suite."""
@@ -158,16 +158,16 @@ class Content:
         title = f"{scoring} scoring, {TABLES[table]}"
         return Table(title, columns, tuple(rows), tuple(self._board_notes(ranking)))
 
-    def detector_cell(self, one: Standing) -> Cell:
+    def detector_cell(self, standing: Standing) -> Cell:
         """Name of a detector with a link to its page."""
-        key = one.contender.key
-        title = f"{shown(one.contender.name)}, identity {one.contender.identity[:12]}"
-        return Cell(self.names.detectors[key], title=title, link=self.names.detector_page(one.contender))
+        key = standing.contender.key
+        title = f"{shown(standing.contender.name)}, identity {standing.contender.identity[:12]}"
+        return Cell(self.names.detectors[key], title=title, link=self.names.detector_page(standing.contender))
 
-    def _against(self, ranking: Ranking, leader: Standing, one: Standing) -> Cell:
-        if one is leader:
+    def _against(self, ranking: Ranking, leader: Standing, standing: Standing) -> Cell:
+        if standing is leader:
             return Cell("first", key="-1")
-        pair = ranking.pair(one.contender.key, leader.contender.key, ranking.main)
+        pair = ranking.pair(standing.contender.key, leader.contender.key, ranking.main)
         if pair is None:
             return Cell("n/a")
         word = {"differs": "worse" if pair.better == pair.second else "better", "equal": "equal"}.get(pair.verdict)
@@ -185,7 +185,7 @@ class Content:
             yield f"The rank is by {quantity(ranking, ranking.main).title}."
         yield from ranking.metrics.notes
         if all(one.rank is None for one in ranking.standings):
-            yield "No ranks: captures, or blocks of a second, are too few to tell detectors apart."
+            yield "No ranks: captures, or blocks of a second, are too few to distinguish detectors."
         elif any(one.rank is None for one in ranking.standings):
             yield "– : no rank, as the detector was not scored on all captures of this board; its numbers are of fewer."
 
@@ -206,7 +206,7 @@ class Content:
         )
         for verdict, said in (
             ("equal", "practically equal to it: {}"),
-            ("undecided", "not told apart from it: {}"),
+            ("undecided", "not distinguished from it: {}"),
             ("differs", "significantly different from it: {}"),
             ("too few groups", "too few captures to compare it with: {}"),
             ("undefined", "nothing to compare it with: {}"),
@@ -245,7 +245,7 @@ class Content:
         return Table("Compared in pairs", columns, tuple(rows))
 
     def suite_facts(self, suite: Suite) -> list[tuple[str, str]]:
-        """What a version of a suite stands for."""
+        """What a version of a suite is made of."""
         reference = reference_of(suite)
         rules = suite.newest.rules
         machines = dict.fromkeys(machine for run in suite.runs for machine in run.machines)
@@ -332,12 +332,12 @@ def metric_cell(by: Quantity, estimate: Estimate) -> Cell:
     """Value with its interval below."""
     text = number(estimate.value, by.digits, by.factor)
     ends = between(estimate.low, estimate.high, by.digits, by.factor)
-    return Cell(text, small=ends, key=_key(estimate.value), title=by.told(estimate))
+    return Cell(text, small=ends, key=_key(estimate.value), title=by.in_full(estimate))
 
 
-def speed_cell(one: Standing) -> Cell:
+def speed_cell(standing: Standing) -> Cell:
     """Time ratio with its interval below; absolute times hold on one machine only and are not shown here."""
-    speed = one.speed
+    speed = standing.speed
     if speed is None:
         return Cell("not timed", key="n/a")
     return Cell(number(speed.ratio, 2), small=between(speed.low, speed.high, 2), key=_key(speed.ratio))

@@ -4,7 +4,7 @@ Conventions
 -----------
 * A site is written into a folder that is new, empty, or made by this command before, as a marker in it says.
 * Only files that the marker lists are replaced or removed. Anything else there, such as a CNAME, stays; where it
-  stands in the way of a page, nothing is written.
+  is in the way of a page, nothing is written.
 """
 
 from __future__ import annotations

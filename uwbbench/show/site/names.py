@@ -1,4 +1,4 @@
-"""What things are called on a site, and where their pages stand: safe and distinct whatever their names hold."""
+"""Labels and addresses of detectors and datasets on a site: safe and distinct whatever their names hold."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from uwbbench.run.folder.identity import digest
 from uwbbench.show.text.sheet import labels, shown
 
 SHORT = 7
-"""Digits of a hash that are shown; enough to tell versions apart by eye."""
+"""Digits of a hash that are shown; enough to distinguish versions by eye."""
 
 LONGEST_SLUG = 40
 
@@ -29,12 +29,12 @@ class Names:
         for one in contenders.values():
             versions.setdefault(one.name, set()).add(one.identity)
         short = labels(versions)
-        told = {
+        versioned = {
             key: f"{short[one.name]} ({one.identity[:SHORT]})" if len(versions[one.name]) > 1 else short[one.name]
             for key, one in contenders.items()
         }
-        distinct = labels(told.values(), longest=60)
-        self.detectors = {key: distinct[text] for key, text in told.items()}
+        distinct = labels(versioned.values(), longest=60)
+        self.detectors = {key: distinct[text] for key, text in versioned.items()}
         self._several: dict[str, int] = {}
         for suite in suites:
             self._several[suite.name] = self._several.get(suite.name, 0) + 1

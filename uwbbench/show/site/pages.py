@@ -87,7 +87,7 @@ HOW = (
     f"Rank: one more than the number of detectors that are better by more than chance (Holm-adjusted p below "
     f"{SIGNIFICANCE:g}) and more than the margin. Detectors share ranks.",
     f"Practically equal: the whole {SETTINGS['confidence']:.0%} interval of the difference lies within the metric's "
-    "margin. Not told apart: the captures do not decide.",
+    "margin. Not distinguished: the captures do not decide.",
     "Pairs are compared on the captures that both were scored on, on the same bootstrap draws of captures; of blocks "
     f"of a second where captures are fewer than {MINIMUM_GROUPS}. Brackets: {SETTINGS['confidence']:.0%} intervals.",
     "Time is only given as a ratio to the common reference detector, measured in alternating blocks on one machine. "
@@ -175,7 +175,7 @@ def _dataset(content: Content, section: Section) -> Page:
 
 
 def _captures(section: Section) -> Table:
-    """Captures with licence and content; one that nobody could open is told too."""
+    """Captures with licence and content; one that nobody could open is listed too."""
     rows = []
     for capture in section.suite.captures_of(section.dataset):
         sha256 = section.suite.captures[section.dataset, capture]

@@ -12,7 +12,7 @@ from uwbbench.show.site.pages import pages
 
 DATA = "leaderboard.json"
 NO_JEKYLL = ".nojekyll"
-"""Tells GitHub Pages to serve the files as they are."""
+"""Makes GitHub Pages serve the files as they are."""
 
 
 def rendered(content: Content) -> Mapping[str, str]:
@@ -23,11 +23,11 @@ def rendered(content: Content) -> Mapping[str, str]:
     ReportToolsError
         If Jinja2 or vl-convert is not installed.
     """
-    found = {
+    documents = {
         page.address: document(
             "site/site", generator="uwbbench leaderboard", badge=page.badge, lead=page.lead, page=page
         )
         for page in pages(content)
     }
     data = json.dumps(plain(content.to_dict()), indent=1, allow_nan=False)
-    return {**found, DATA: f"{data}\n", NO_JEKYLL: ""}
+    return {**documents, DATA: f"{data}\n", NO_JEKYLL: ""}

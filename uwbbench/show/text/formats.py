@@ -29,7 +29,7 @@ from uwbbench.show.text.sheet import Sheet
 
 MARK = "uwbbench report"
 INDEX = "tables.json"
-"""File that tells a folder of CSV tables from any other folder."""
+"""File that distinguishes a folder of CSV tables from any other folder."""
 
 _LATEX = {
     "\\": r"\textbackslash{}",

@@ -28,12 +28,12 @@ def limits_sheets(limits: Limits) -> Iterator[Sheet]:
 
 
 def _grid(table: pd.DataFrame, rows: list[str], column: str, cell: Any) -> list[tuple[str, ...]]:
-    """Texts of a table whose values of ``column`` stand side by side, in the order they first appear."""
-    found: dict[tuple[Any, ...], dict[Any, str]] = {}
+    """Texts of a table whose values of ``column`` are side by side, in the order they first appear."""
+    grid: dict[tuple[Any, ...], dict[Any, str]] = {}
     for row in table.to_dict("records"):
-        found.setdefault(tuple(row[name] for name in rows), {})[row[column]] = cell(row)
+        grid.setdefault(tuple(row[name] for name in rows), {})[row[column]] = cell(row)
     across = list(dict.fromkeys(table[column]))
-    return [(*map(_plain, key), *(cells.get(value, "n/a") for value in across)) for key, cells in found.items()]
+    return [(*map(_plain, key), *(cells.get(value, "n/a") for value in across)) for key, cells in grid.items()]
 
 
 def _plain(value: object) -> str:
@@ -117,7 +117,7 @@ def _false_alarms(table: pd.DataFrame) -> Sheet:
     columns = ("detector", "measured a cell", "requested", "ratio", "cells, noise model", "alarms", "cells")
     notes = (
         "Detections a tap of noise alone. Only CFAR stages ask for a rate, and they mean it for 'all' cells over their "
-        "threshold and, unless told otherwise, for independent noise; this noise is correlated.",
+        "threshold and, unless set otherwise, for independent noise; this noise is correlated.",
         "95 % intervals over frames: alarms in cells of one frame come together.",
     )
     return Sheet(f"{_TITLE}: false alarms", columns, tuple(rows), notes)

@@ -66,7 +66,7 @@ class Quantity:
         text = interval(estimate.value, estimate.low, estimate.high, self.digits, self.factor)
         return f"{text} {self.unit}".strip()
 
-    def told(self, estimate: Estimate) -> str:
+    def in_full(self, estimate: Estimate) -> str:
         """Value with unit, interval and count, or why there is none."""
         if math.isnan(estimate.value):
             return "undefined"

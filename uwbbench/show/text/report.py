@@ -20,8 +20,16 @@ from uwbbench.show.text.wording import TABLES
 
 def sheets(report: Report) -> list[Sheet]:
     """All tables of a report: leaderboards, the paper's tables, times, and what did not work."""
-    made = Tables(report)
-    parts = (made.leaderboards, made.paper, made.limits, made.latency, made.stability, made.captures, made.failed)
+    tables = Tables(report)
+    parts = (
+        tables.leaderboards,
+        tables.paper,
+        tables.limits,
+        tables.latency,
+        tables.stability,
+        tables.captures,
+        tables.failed,
+    )
     return [sheet for part in parts for sheet in part()]
 
 
@@ -54,7 +62,7 @@ class Tables:
             yield _latency(self._report)
 
     def stability(self) -> Iterator[Sheet]:
-        """How the detectors stood the hard cases."""
+        """Results of the detectors in the hard cases."""
         if self._report.stability:
             yield _stability(self._report)
 
@@ -92,8 +100,8 @@ def markdown(report: Report) -> str:
         lines += ["## Notes", "", *(f"* {escaped(sentence(note))}" for note in report.notes), ""]
     session = report.folder.manifest["sessions"][-1]
     machine, versions = session["machine"], session["versions"]
-    made = f"uwbbench {versions['uwbbench']}, Python {versions['python']}, {machine['cpu']}, {machine['os']}"
-    lines += [f"Made with {escaped(made)}; started {session['started']}."]
+    versions_line = f"uwbbench {versions['uwbbench']}, Python {versions['python']}, {machine['cpu']}, {machine['os']}"
+    lines += [f"Made with {escaped(versions_line)}; started {session['started']}."]
     return "\n".join(lines) + "\n"
 
 
@@ -160,20 +168,24 @@ def _stability(report: Report) -> Sheet:
     columns += ("largest error (ulp)", "flips by float32 (%)", "flips by one ulp (%)")
     rows: list[tuple[str, ...]] = []
     notes: list[str] = []
-    for one in report.stability:
-        name = shown(one["detector"])
-        if "refused" in one:
+    for result in report.stability:
+        name = shown(result["detector"])
+        if "refused" in result:
             rows.append((name, *["n/a"] * (len(columns) - 1)))
-            notes.append(f"{name} cannot run on the capture of the hard cases: {sentence(one['refused'])}")
+            notes.append(f"{name} cannot run on the capture of the hard cases: {sentence(result['refused'])}")
             continue
-        counts = [str(one[key]) for key in ("passed", "failed", "not_applicable")]
-        sizes = ["n/a" if one[key] is None else f"{one[key]:.1e}" for key in ("largest_error_m", "largest_error_ulp")]
-        flips = [number(one[key], 2, 100.0) for key in ("flips_float32", "flips_one_ulp")]
-        rows.append((name, number(one["usual_hits"], 0, 100.0), *counts, *sizes, *flips))
-        failed = [f"{case['case']} ({sentence(case['detail'])})" for case in one["cases"] if case["status"] == "failed"]
+        counts = [str(result[key]) for key in ("passed", "failed", "not_applicable")]
+        sizes = [
+            "n/a" if result[key] is None else f"{result[key]:.1e}" for key in ("largest_error_m", "largest_error_ulp")
+        ]
+        flips = [number(result[key], 2, 100.0) for key in ("flips_float32", "flips_one_ulp")]
+        rows.append((name, number(result["usual_hits"], 0, 100.0), *counts, *sizes, *flips))
+        failed = [
+            f"{case['case']} ({sentence(case['detail'])})" for case in result["cases"] if case["status"] == "failed"
+        ]
         notes += [f"{name} failed: {shown('; '.join(failed))}"] if failed else []
     about = (
-        "Inputs at which numerical code breaks, made by uwbbench and SIMULATED; 'uwbbench stability' tells each case."
+        "Inputs at which numerical code breaks, made by uwbbench and SIMULATED; 'uwbbench stability' shows each case."
     )
     return Sheet("Hard cases", columns, tuple(rows), (about, *notes))
 
@@ -196,11 +208,11 @@ def _latency(report: Report) -> Sheet:
         "THIS MACHINE ONLY: times in us of single calls, one frame each, on one core with one thread.",
         f"What travels is the ratio to a reference detector ({references}), measured in alternating blocks.",
         "Ratio of all time: of all blocks together, in which rare expensive calls count as much as they take.",
-        "n/a: too few calls for that percentile (36, 72 and 368 for P90, P95 and P99), or not told by the detector.",
+        "n/a: too few calls for that percentile (36, 72 and 368 for P90, P95 and P99), or the detector reports none.",
         "At most: upper end of the 95 % interval of the share of missed deadlines, for independent calls.",
         "harness: the same loop with a detector that does nothing.",
     )
-    told = dict.fromkeys(
+    detector_notes = dict.fromkeys(
         f"{shown(row['detector'])}: {row['notes']}" for row in table.to_dict("records") if row["notes"]
     )
-    return Sheet("Latency", columns, tuple(rows), (*notes, *told))
+    return Sheet("Latency", columns, tuple(rows), (*notes, *detector_notes))

@@ -69,11 +69,11 @@ def labels(names: Iterable[str], longest: int = 28) -> dict[str, str]:
     >>> labels(["a" * 40, "a" * 41, "paper"], longest=6)["paper"]
     'paper'
     """
-    found: dict[str, str] = {}
+    by_name: dict[str, str] = {}
     for name in dict.fromkeys(names):
         short = printable(name.strip(), longest) or "(no name)"
         label, copy = short, 2
-        while label in found.values():
+        while label in by_name.values():
             label, copy = f"{short} ({copy})", copy + 1
-        found[name] = label
-    return found
+        by_name[name] = label
+    return by_name

@@ -70,7 +70,7 @@ def checks_within(
     few = _too_few(label, joined["base"])
     if few:
         return few
-    size = turn_frames([found["call_s"] for found in joined.values()])
+    size = turn_frames([found["call_s"] for found in joined.values()], joined["base"]["frames"])
     again, other = (partial(_blocks, worker, player, size) for player in ("base again", "head"))
     return _judged(label, settings, again, other, settings.blocks, "blocks", tell)
 
@@ -107,7 +107,7 @@ def _pair(gate: Gate, settings: LatencyGateModel, ref: CaptureRef, first: Side, 
     """Median log ratio of the blocks of two fresh processes that take turns."""
     with worker_of(first, gate.model.timeout_s) as one, worker_of(second, gate.model.timeout_s) as other:
         joined = _both_joined((one, other), (first, second), settings, ref)
-        size = turn_frames([found["call_s"] for found in joined])
+        size = turn_frames([found["call_s"] for found in joined], joined[0]["frames"])
         times_s = alternate([partial(_turn, worker, size) for worker in (one, other)], settings.blocks)
         return float(np.median(log_ratios(times_s[:, 1], times_s[:, 0])))
 

@@ -28,7 +28,9 @@ Error rates
 ``python tests/bench/bench_gate.py`` runs 100 gates of each of two detectors against itself and 100 against itself
 slowed by 10 %, and prints how many raised an alarm, each with its exact interval. A false alarm needs the lower end of
 the interval to pass 5 % although the medians of equal detectors scatter by some tenths of a per cent; a miss needs the
-upper end below 5 % although the median is at 10 %.
+upper end below 5 % although the median is at 10 %. Simulated, with drift and up to seven turns in ten disturbed, none
+of 1 000 gates of equal detectors raises an alarm and none of 1 000 of a detector slower by 10 % passes; in the worst
+case 4 and 5 % are inconclusive.
 """
 
 from __future__ import annotations

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from uwbbench.api.capture import Capture
     from uwbbench.measure.latency.player import Player
 
-PROTOCOL = 2
+PROTOCOL = 3
 """Raised whenever requests or answers change their meaning: only equal numbers understand each other."""
 
 
@@ -46,7 +46,7 @@ class Session:
         }
 
     def turn(self, player: str, size: int) -> dict[str, Any]:
-        """Time of the player's next frames."""
+        """Time of the player's next turn."""
         return {"spent_s": self._players[player].turn(size)}
 
     def blocks(self, base: str, head: str, size: int, count: int) -> dict[str, Any]:
