@@ -1,8 +1,9 @@
 """Draw the map of the house from its imports; run as a script it writes ``docs/images/architecture.svg``.
 
 Rooms stand in the order that the layers contract in ``pyproject.toml`` gives them. An arrow says that some module of a
-room imports something of another, also inside a function or for type checkers only. What the package ``uwbbench``
-itself imports is left out: those are its public names, from all rooms. A test compares the stored picture with what
+room imports something of another, also inside a function or for type checkers only; imports that the contract excuses
+by name stand at the left, dashed. What the package ``uwbbench`` itself imports is left out: those are its public names,
+from all rooms. A test compares the stored picture with what
 this script makes of the code.
 """
 
@@ -12,6 +13,7 @@ import ast
 import tomllib
 from collections import defaultdict
 from pathlib import Path
+from typing import Any
 from xml.sax.saxutils import escape
 
 ROOT = Path(__file__).parents[2]
@@ -28,15 +30,20 @@ ROOMS = {
     "tools": "checks, gates, tuning, scaffolds, Python functions",
     "cli": "the commands",
 }
-WIDTH, BOX, HEIGHT, GAP, LEFT, TOP = 880, 470, 62, 20, 24, 132
+WIDTH, BOX, HEIGHT, GAP, LEFT, TOP = 940, 470, 62, 20, 84, 132
 COLOURS = ("#000000", "#0072B2", "#009E73", "#D55E00", "#CC79A7", "#56B4E9", "#B8860B", "#7A4FBF", "#666666")
+
+
+def contract() -> dict[str, Any]:
+    """The layers contract."""
+    contracts = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["importlinter"]["contracts"]
+    (layers,) = (one for one in contracts if one["type"] == "layers")
+    return layers
 
 
 def rooms() -> list[str]:
     """Rooms in the order of data, the lowest first."""
-    contracts = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["importlinter"]["contracts"]
-    (layers,) = (one["layers"] for one in contracts if one["type"] == "layers")
-    return [name for name in reversed(layers) if (ROOT / "uwbbench" / name).is_dir()]
+    return [name for name in reversed(contract()["layers"]) if (ROOT / "uwbbench" / name).is_dir()]
 
 
 def sub_rooms(room: str) -> list[str]:
@@ -44,21 +51,29 @@ def sub_rooms(room: str) -> list[str]:
     return sorted(path.parent.name for path in (ROOT / "uwbbench" / room).glob("*/__init__.py"))
 
 
-def imports() -> set[tuple[str, str]]:
-    """Pairs of places of which the first imports the second; a plugin package is a place as a room is."""
-    known = set(rooms())
-    found = set()
+def imports() -> tuple[set[tuple[str, str]], set[tuple[str, str]]]:
+    """Pairs of places of which the first imports the second, and those that only excused imports join.
+
+    A plugin package is a place as a room is.
+    """
+    known = {*rooms(), *PLUGINS}
+    excuses = [tuple(line.split(" -> ")) for line in contract().get("ignore_imports", [])]
+    found, excused = set(), set()
     for folder in (ROOT / "uwbbench", *(ROOT / parent / name for name, parent in PLUGINS.items())):
         for path in folder.rglob("*.py"):
-            place = path.relative_to(folder).parts[0] if folder.name == "uwbbench" else folder.name
-            if place not in known | set(PLUGINS):
-                continue
+            module = ".".join(path.relative_to(folder.parent).with_suffix("").parts).removesuffix(".__init__")
             for name in _imported(path):
-                package, _, rest = name.partition(".")
-                other = rest.partition(".")[0] if package == "uwbbench" else package
-                if other in known | set(PLUGINS) and other != place:
-                    found.add((place, other))
-    return found
+                pair = _place(module), _place(name)
+                if pair[0] != pair[1] and known.issuperset(pair):
+                    by_name = any(module == source and f"{name}.".startswith(f"{to}.") for source, to in excuses)
+                    (excused if by_name else found).add(pair)
+    return found, excused - found
+
+
+def _place(module: str) -> str:
+    """Room, or plugin package, that a module belongs to."""
+    package, _, rest = module.partition(".")
+    return rest.partition(".")[0] if package == "uwbbench" else package
 
 
 def _imported(path: Path) -> set[str]:
@@ -75,7 +90,9 @@ def _imported(path: Path) -> set[str]:
 def draw() -> str:
     """The map as SVG."""
     order = rooms()
-    edges = sorted(imports(), key=lambda pair: [[*PLUGINS, *order].index(name) for name in pair])
+    used, excused = (
+        sorted(pairs, key=lambda pair: [[*PLUGINS, *order].index(name) for name in pair]) for pairs in imports()
+    )
     top = {room: TOP + place * (HEIGHT + GAP) for place, room in enumerate(order)}
     bottom = top[order[-1]] + HEIGHT
     parts = [
@@ -90,14 +107,17 @@ def draw() -> str:
         x = LEFT + number * (BOX // 2 + 5)
         parts += [_box(x, 24, BOX // 2 - 5, 50, "#FFF6E0"), _text(x + 14, 46, f"{PLUGINS[plugin]}/", 16, "bold")]
         parts.append(_text(x + 14, 64, "plugins, found by entry points", 12))
-    for place, other in edges:
+    for place, other in used:
         if place in PLUGINS and other == order[0]:
             x = LEFT + list(PLUGINS).index(place) * (BOX // 2 + 5) + BOX // 4
             parts.append(f'<path d="M{x} 74V{TOP - 3}" stroke="#000" fill="none" marker-end="url(#head-0)"/>')
     parts += [part for room in order for part in _room(room, top[room])]
-    parts += _arrows([edge for edge in edges if edge[0] in top], order, top)
-    legend = "Data flows down. An arrow leads from a room to one that it uses: all go up, none comes back."
-    parts.append(_text(LEFT, bottom + 36, legend, 14))
+    parts += _arrows([pair for pair in used if pair[0] in top], order, top)
+    parts += [_excuse(source, target, top, place) for place, (source, target) in enumerate(excused)]
+    legend = "Data flows down. An arrow leads from a room to one that it uses: all solid ones go up."
+    parts.append(_text(LEFT, bottom + 30, legend, 14))
+    if excused:
+        parts.append(_text(LEFT, bottom + 50, "Dashed: excused by name; a notebook asks an object how it looks.", 14))
     return "\n".join([*parts, "</svg>", ""])
 
 
@@ -146,6 +166,14 @@ def _arrows(edges: list[tuple[str, str]], order: list[str], top: dict[str, int])
         )
         parts.append(f'<path d="{curve}" {look}><title>{source} uses {target}</title></path>')
     return parts
+
+
+def _excuse(source: str, target: str, top: dict[str, int], number: int) -> str:
+    """Dashed curve at the left of the boxes."""
+    start, end = top[source] + HEIGHT / 2, top[target] + 16 + 9 * number
+    bend = LEFT - 14 - 0.16 * abs(end - start)
+    look = 'fill="none" stroke="#666" stroke-dasharray="5 4" marker-end="url(#head-8)"'
+    return f'<path d="M{LEFT} {start}C{bend:.0f} {start} {bend:.0f} {end} {LEFT - 3} {end}" {look}/>'
 
 
 if __name__ == "__main__":

@@ -9,7 +9,7 @@ import pytest
 from PIL import Image
 
 EXAMPLES = sorted((Path(__file__).parents[2] / "examples").glob("*.py"))
-LEAST_PIXELS, LEAST_COLOURS, LEAST_INK = 400, 20, 0.01
+LEAST_PIXELS, LEAST_COLOURS, LEAST_INK = 300, 20, 0.01
 LONGEST = 60
 
 
