@@ -5,11 +5,16 @@ import os
 import sys
 from pathlib import Path
 
+import hypothesis
 import pytest
 
 from tests.fixtures.chance import seed
 from uwbbench.api import Capture, registry
 from uwbbench.api.registry import load_plugin
+
+# A busy machine takes longer over an example than any deadline allows for; how long things take is measured elsewhere.
+hypothesis.settings.register_profile("any machine", deadline=None)
+hypothesis.settings.load_profile("any machine")
 
 pytest_plugins = ["tests.fixtures.runs", "tests.fixtures.contributions"]
 

@@ -43,6 +43,17 @@ def textbook_clusters(points_m: FloatArray, eps_m: float, min_samples: int) -> I
 
     A point is a core point where ``min_samples`` points, itself included, lie at most ``eps_m`` away (Ester, Kriegel,
     Sander, Xu, KDD 1996).
+
+    Parameters
+    ----------
+    points_m : (points, 2) array
+    eps_m : float
+        Radius of the neighbourhood; a point at that very distance is inside.
+    min_samples : int
+
+    Returns
+    -------
+    (points,) int array
     """
     exact = [tuple(map(Fraction, point)) for point in points_m.tolist()]
     reach = Fraction(eps_m) ** 2
