@@ -1,6 +1,6 @@
 """Draw the map of the house from its imports; run as a script it writes ``docs/images/architecture.svg``.
 
-Rooms stand in the order that the layers contract in ``pyproject.toml`` gives them. An arrow says that some module of a
+Rooms are in the order that the layers contract in ``pyproject.toml`` gives them. An arrow says that some module of a
 room imports something of another, also inside a function or for type checkers only. What the package ``uwbbench``
 itself imports is left out: those are its public names, from all rooms. A test compares the stored picture with what
 this script makes of the code.
@@ -62,7 +62,7 @@ def imports() -> set[tuple[str, str]]:
 
 
 def _imported(path: Path) -> set[str]:
-    """Modules that a file names in its imports, wherever they stand; the project has no relative imports."""
+    """Modules that a file names in its imports, wherever they are; the project has no relative imports."""
     names = set()
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Import):

@@ -39,8 +39,8 @@ def origin_is_stated(subject: ClassSubject) -> str:
     if fidelity not in FIDELITIES:
         raise Nonconformity(f"fidelity {', '.join(FIDELITIES)}", repr(fidelity))
     module = inspect.getmodule(subject.cls)
-    told = f"{subject.cls.__doc__}\n{module.__doc__ if module else ''}"
-    if fidelity in FIDELITIES[:2] and not _SOURCE.search(told):
+    docs = f"{subject.cls.__doc__}\n{module.__doc__ if module else ''}"
+    if fidelity in FIDELITIES[:2] and not _SOURCE.search(docs):
         raise Nonconformity(
             f"a citation beside fidelity '{fidelity}', such as a year, an arXiv number or a DOI",
             "none in the docstrings of class and module",
@@ -74,8 +74,8 @@ def defaults_are_valid(subject: ClassSubject) -> None:
             try:
                 TypeAdapter(annotated).validate_python(field.get_default(call_default_factory=True))
             except ValidationError as error:
-                told = f"{name}: {error.errors(include_url=False)[0]['msg']}"
-                raise Nonconformity("defaults that their own limits allow", told) from error
+                observed = f"{name}: {error.errors(include_url=False)[0]['msg']}"
+                raise Nonconformity("defaults that their own limits allow", observed) from error
     working_params(subject.cls.params_type(), subject.given, f"{subject.kind} '{subject.name}'", subject.name)
 
 

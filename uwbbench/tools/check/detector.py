@@ -213,7 +213,7 @@ def candidates_change_nothing(subject: DetectorSubject) -> str:
     same(values_of(plain), values_of(audited), "the same detections beside their candidates")
     candidates = audited.candidates
     if candidates is None:
-        raise NotApplicable("the detector cannot tell")
+        raise NotApplicable("the detector cannot say")
     retained = int(np.sum(candidates["retained"] == 1)) if "retained" in candidates else 0
     if retained != len(audited):
         raise Nonconformity(f"{len(audited)} retained candidates", str(retained))

@@ -166,8 +166,8 @@ def partials_are_flat_arrays(subject: MetricSubject) -> None:
     found = [subject.cls.partial(one) for one in subject.outcomes]
     for part in found:
         if not isinstance(part, np.ndarray) or part.ndim != 1 or part.dtype != np.float64:
-            told = f"{part.dtype} of shape {part.shape}" if isinstance(part, np.ndarray) else type(part).__name__
-            raise Nonconformity("float64 arrays of one dimension", told)
+            observed = f"{part.dtype} of shape {part.shape}" if isinstance(part, np.ndarray) else type(part).__name__
+            raise Nonconformity("float64 arrays of one dimension", observed)
     lengths = {len(part) for part in [*found, subject.cls.partial(empty())]}
     if subject.cls.merge == "sum" and len(lengths) > 1:
         raise Nonconformity("partials of one length", f"lengths {sorted(lengths)}")
@@ -226,8 +226,8 @@ def perfection_is_best(subject: MetricSubject) -> str:
     beaten = {name: cls.merit(best) - cls.merit(value) for name, value in others.items()}
     wrong = next((name for name, lead in beaten.items() if lead < -1e-12), None)
     if wrong:
-        told = f"perfect {best:g}, one that {wrong} {others[wrong]:g}, and {cls.better} is better"
-        raise Nonconformity("no flawed detector above the perfect one", told)
+        observed = f"perfect {best:g}, one that {wrong} {others[wrong]:g}, and {cls.better} is better"
+        raise Nonconformity("no flawed detector above the perfect one", observed)
     if not any(lead > 0 for lead in beaten.values()):
         raise Nonconformity("a worse value for some flaw", f"{best:g} for all of {', '.join(others)}")
     return f"perfect: {best:g}"
@@ -272,8 +272,10 @@ def open_truth_is_fine(subject: MetricSubject) -> str:
     """Captures whose truth is not exhaustive come through; a metric that is undefined there says so, and no other."""
     value = evaluate(subject.cls, [dataclasses.replace(one, exhaustive=False) for one in subject.outcomes])
     if subject.cls.needs_exhaustive_truth != math.isnan(value):
-        told = f"needs_exhaustive_truth = {subject.cls.needs_exhaustive_truth}"
-        raise Nonconformity(f"needs_exhaustive_truth = {math.isnan(value)}, as the value is {value:.4g} there", told)
+        observed = f"needs_exhaustive_truth = {subject.cls.needs_exhaustive_truth}"
+        raise Nonconformity(
+            f"needs_exhaustive_truth = {math.isnan(value)}, as the value is {value:.4g} there", observed
+        )
     return f"{value:.4g}"
 
 

@@ -19,7 +19,7 @@ _STAGE = "uwbbench.api.stage.Stage"
 
 @check(_STAGE)
 def ports_are_sets_of_names(subject: StageSubject) -> str:
-    """Ports are frozen sets of text, made with ``ports``, and what is needed of a capture is one of three things."""
+    """Ports are frozen sets of text, made with ``ports``, and what is needed of a capture is among three names."""
     for attribute in ("consumes", "produces", "removes", "needs"):
         value = getattr(subject.cls, attribute)
         if not isinstance(value, frozenset) or not all(isinstance(port, str) for port in value):
@@ -68,9 +68,9 @@ def declares_what_it_changes(subject: StageSubject) -> None:
         kept = {"frame index", "frames", *PARTS}  # rows were dropped or made: their columns cannot be compared
         before = {name: values for name, values in before.items() if name in kept}
     for name in before.keys() & after.keys() - subject.cls.produces - subject.cls.removes - {"frame index"}:
-        told = difference({name: before[name]}, {name: after[name]})
-        if told:
-            raise Nonconformity(f"'{name}' as it was, or declared in produces", told)
+        deviation = difference({name: before[name]}, {name: after[name]})
+        if deviation:
+            raise Nonconformity(f"'{name}' as it was, or declared in produces", deviation)
 
 
 @check(_STAGE)
@@ -86,15 +86,17 @@ def uses_only_what_it_declares(subject: StageSubject) -> str:
         try:
             found = _answer(subject, lacking(full, port))
         except Exception as error:
-            told = f"without it: {last_line(error)}"
-            raise Nonconformity(f"no use of {port}, or its declaration", told) from error
-        told = difference(usual, found)
-        if told and port == "frames":
-            raise Nonconformity("no use of samples, or consumes = ports('frames', ...)", f"other samples give {told}")
+            observed = f"without it: {last_line(error)}"
+            raise Nonconformity(f"no use of {port}, or its declaration", observed) from error
+        deviation = difference(usual, found)
+        if deviation and port == "frames":
+            raise Nonconformity(
+                "no use of samples, or consumes = ports('frames', ...)", f"other samples give {deviation}"
+            )
         lost = _lost(usual, found)
         if lost:
             raise Nonconformity(f"no use of {port}, or its declaration", f"without it {lost}")
-        optional += [port] if told else []
+        optional += [port] if deviation else []
     return f"optional: {', '.join(optional)}" if optional else ""
 
 
@@ -103,7 +105,7 @@ def _undeclared(subject: StageSubject, full: Block) -> list[str]:
     there = [*PARTS, *full.detections.columns, "detections", "frames"]
     ports = [port for port in dict.fromkeys(there) if port != "frame" and port not in subject.cls.consumes]
     reported = [("STS responses", "sts"), ("reported first path", "first_path")]
-    return ports + [told for told, need in reported if need not in subject.cls.needs]
+    return ports + [label for label, need in reported if need not in subject.cls.needs]
 
 
 def _answer(subject: StageSubject, block: Block) -> Values:
@@ -144,9 +146,9 @@ def rowwise_is_true(subject: StageSubject) -> None:
     half = np.arange(0, len(subject.block.detections), 2)
     found = subject.run(subject.block.replace(detections=subject.block.detections.take(half)))
     expected = {name: subject.usual[name][half] for name in cls.produces if name in subject.usual}
-    told = difference(expected, {name: found[name] for name in expected})
-    if told:
-        raise Nonconformity("the same values for each row, or rowwise = False", told)
+    deviation = difference(expected, {name: found[name] for name in expected})
+    if deviation:
+        raise Nonconformity("the same values for each row, or rowwise = False", deviation)
 
 
 @check("uwbbench.api.stage.Filter")
@@ -177,7 +179,7 @@ def filters_give_a_mask(subject: StageSubject) -> None:
 
 @check(_STAGE)
 def finds_something(subject: StageSubject) -> str:
-    """A stage that makes detections finds some in the usual capture, whose echo stands 27 dB above the noise."""
+    """A stage that makes detections finds some in the usual capture, whose echo is 27 dB above the noise."""
     if "detections" not in subject.cls.produces:
         raise NotApplicable("the stage makes no detections")
     if subject.cls.fidelity == "reference":

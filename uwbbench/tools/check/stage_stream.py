@@ -47,7 +47,7 @@ def instances_share_nothing(subject: StageSubject) -> None:
 
 @check("uwbbench.api.stage.Stage.note")
 def notes_come_from_note(subject: StageSubject) -> str:
-    """Notes are told by ``note``, each once, the same for any cut, and are gone after ``open``."""
+    """Notes are given by ``note``, each once, the same for any cut, and are gone after ``open``."""
     stage = subject.opened()
     subject.run(subject.block, stage=stage)
     whole = list(stage.notes)
@@ -71,13 +71,13 @@ def one_frame_is_in_time(subject: StageSubject) -> str:
     """
     blocks = pieces(subject.block, CUTS["single frames"])[:CALLS]
     own_s, period_s = call_s(subject.opened().step, blocks), 1 / subject.capture.radar.frame_rate_hz
-    told = f"{own_s * 1e6:.0f} us a call"
+    observed = f"{own_s * 1e6:.0f} us a call"
     if "stage.idle" in registry.entries("defaults"):
         nothing = StageSubject(registry.default("stage.idle")).opened()
-        told += f", {own_s / call_s(nothing.step, blocks):.1f} times doing nothing"
+        observed += f", {own_s / call_s(nothing.step, blocks):.1f} times doing nothing"
     if own_s > period_s:
-        raise Nonconformity(f"a call for one frame within {period_s * 1e3:.1f} ms", told)
-    return told
+        raise Nonconformity(f"a call for one frame within {period_s * 1e3:.1f} ms", observed)
+    return observed
 
 
 @check(_STAGE)

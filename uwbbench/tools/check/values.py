@@ -43,13 +43,13 @@ def of_detections(found: Detections) -> Values:
 
 
 def difference(one: Mapping[str, NDArray[Any]], other: Mapping[str, NDArray[Any]]) -> str:
-    """First thing that is not bit-equal, in words with the smallest numbers; empty if nothing is."""
+    """First part that is not bit-equal, and where, in words; empty if all are equal."""
     for name in dict.fromkeys([*one, *other]):
         if name not in one or name not in other:
             return f"'{name}' is there only {'the first' if name in one else 'the second'} time"
-        told = _difference(one[name], other[name])
-        if told:
-            return f"{name}: {told}"
+        deviation = _difference(one[name], other[name])
+        if deviation:
+            return f"{name}: {deviation}"
     return ""
 
 
@@ -84,9 +84,9 @@ def same(one: Mapping[str, NDArray[Any]], other: Mapping[str, NDArray[Any]], exp
     Nonconformity
         With the first difference.
     """
-    told = difference(one, other)
-    if told:
-        raise Nonconformity(expected, told)
+    deviation = difference(one, other)
+    if deviation:
+        raise Nonconformity(expected, deviation)
 
 
 def digest(values: Mapping[str, NDArray[Any]]) -> str:

@@ -3,7 +3,7 @@
 Conventions
 -----------
 * A fixed limit is held against the value on these captures, which a deterministic detector gives again and again; the
-  interval beside it tells how far other captures may lie.
+  interval beside it shows how far other captures may lie.
 * Against a stored run, the difference on the same captures counts, in pairs
   (:func:`uwbbench.measure.accuracy.stats.paired_difference`): a regression is a loss whose whole interval lies beyond
   the tolerance. Both are judged by the gate's own rules, and captures are recognised by their content.

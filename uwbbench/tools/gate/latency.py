@@ -178,7 +178,13 @@ def _too_few(label: str, joined: dict[str, Any]) -> list[Check]:
 
 
 def _judged(
-    label: str, settings: LatencyGateModel, again: Sampler, head: Sampler, minimum: int, counted: str, progress: Progress
+    label: str,
+    settings: LatencyGateModel,
+    again: Sampler,
+    head: Sampler,
+    minimum: int,
+    counted: str,
+    progress: Progress,
 ) -> list[Check]:
     limits: dict[str, Any] = {
         "minimum": minimum,

@@ -115,7 +115,9 @@ def tune(tuning: Tuning, progress: Progress = lambda _: None) -> TuneOutcome:
     found = []
     for group in groups:
         progress(f"tuning for {group.text}")
-        found.append(_of_grid(tuning, group, swept) if tuning.sweep is not None else _of_search(tuning, group, progress))
+        found.append(
+            _of_grid(tuning, group, swept) if tuning.sweep is not None else _of_search(tuning, group, progress)
+        )
     return TuneOutcome(tuning, tuple(found), captures, held_out, _notes(tuning, captures, found))
 
 
