@@ -88,10 +88,10 @@ def unknown_parameters_are_refused(subject: ClassSubject) -> None:
     except ConfigError as error:
         if "mine.yaml:3" in str(error) and "unknown key 'no_such_parameter'" in str(error):
             return
-        found = f"the message {str(error).partition(chr(10))[0]!r}"
+        observed = f"the message {str(error).partition(chr(10))[0]!r}"
     else:
-        found = "that the parameter was taken"
-    raise Nonconformity("an error that names file, line and key; derive the model from uwbbench.api.Params", found)
+        observed = "that the parameter was taken"
+    raise Nonconformity("an error that names file, line and key; derive the model from uwbbench.api.Params", observed)
 
 
 @check("uwbbench.api.stage.Params")

@@ -84,16 +84,16 @@ def uses_only_what_it_declares(subject: StageSubject) -> str:
     optional = []
     for port in _undeclared(subject, full):
         try:
-            found = _answer(subject, lacking(full, port))
+            answer = _answer(subject, lacking(full, port))
         except Exception as error:
             observed = f"without it: {last_line(error)}"
             raise Nonconformity(f"no use of {port}, or its declaration", observed) from error
-        deviation = difference(usual, found)
+        deviation = difference(usual, answer)
         if deviation and port == "frames":
             raise Nonconformity(
                 "no use of samples, or consumes = ports('frames', ...)", f"other samples give {deviation}"
             )
-        lost = _lost(usual, found)
+        lost = _lost(usual, answer)
         if lost:
             raise Nonconformity(f"no use of {port}, or its declaration", f"without it {lost}")
         optional += [port] if deviation else []
@@ -144,9 +144,9 @@ def rowwise_is_true(subject: StageSubject) -> None:
     if not cls.rowwise or issubclass(cls, Filter):
         raise NotApplicable("the stage does not claim it" if not cls.rowwise else "a filter adds no columns")
     half = np.arange(0, len(subject.block.detections), 2)
-    found = subject.run(subject.block.replace(detections=subject.block.detections.take(half)))
+    values = subject.run(subject.block.replace(detections=subject.block.detections.take(half)))
     expected = {name: subject.usual[name][half] for name in cls.produces if name in subject.usual}
-    deviation = difference(expected, {name: found[name] for name in expected})
+    deviation = difference(expected, {name: values[name] for name in expected})
     if deviation:
         raise Nonconformity("the same values for each row, or rowwise = False", deviation)
 
@@ -173,8 +173,8 @@ def filters_give_a_mask(subject: StageSubject) -> None:
     mask = subject.opened().keep(subject.block)  # type: ignore[attr-defined]
     expected = f"a bool array of shape ({len(subject.block.detections)},)"
     if not isinstance(mask, np.ndarray) or mask.dtype != bool or mask.shape != (len(subject.block.detections),):
-        found = f"{mask.dtype} of shape {mask.shape}" if isinstance(mask, np.ndarray) else type(mask).__name__
-        raise Nonconformity(expected, found)
+        observed = f"{mask.dtype} of shape {mask.shape}" if isinstance(mask, np.ndarray) else type(mask).__name__
+        raise Nonconformity(expected, observed)
 
 
 @check(_STAGE)

@@ -102,11 +102,11 @@ def kinds_of(name: str) -> tuple[AuthoredKind, ...]:
         return ("detector",)
     known = {kind: list(registry.entries(f"{kind}s")) for kind in AUTHORED_KINDS}
     known["detector"] += shipped("detectors")
-    found = tuple(kind for kind in AUTHORED_KINDS if name in known[kind])
-    if not found:
+    kinds = tuple(kind for kind in AUTHORED_KINDS if name in known[kind])
+    if not kinds:
         every = [other for names in known.values() for other in names]
         raise PluginError(f"no stage, detector, dataset or metric named '{name}'.{nearest(name, every)}")
-    return found
+    return kinds
 
 
 def subject_of(

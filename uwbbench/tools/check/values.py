@@ -21,7 +21,7 @@ Values = dict[str, NDArray[Any]]
 def of_blocks(blocks: Iterable[Block]) -> Values:
     """What consecutive blocks hold, by port; ``detections`` is the frame of each."""
     parts: dict[str, list[NDArray[Any]]] = {}
-    found = []
+    detections = []
     for block in blocks:
         held = {
             "frame index": block.frames.index,
@@ -33,8 +33,8 @@ def of_blocks(blocks: Iterable[Block]) -> Values:
         for name, array in held.items():
             if array is not None:
                 parts.setdefault(name, []).append(array)
-        found.append(block.detections)
-    return {name: np.concatenate(arrays) for name, arrays in parts.items()} | of_detections(Detections.join(found))
+        detections.append(block.detections)
+    return {name: np.concatenate(arrays) for name, arrays in parts.items()} | of_detections(Detections.join(detections))
 
 
 def of_detections(found: Detections) -> Values:
@@ -91,11 +91,11 @@ def same(one: Mapping[str, NDArray[Any]], other: Mapping[str, NDArray[Any]], exp
 
 def digest(values: Mapping[str, NDArray[Any]]) -> str:
     """Hash of names, types, shapes and bits."""
-    whole = hashlib.sha256()
+    combined = hashlib.sha256()
     for name, array in values.items():
-        whole.update(f"{name} {array.dtype} {array.shape};".encode())
-        whole.update(np.ascontiguousarray(array).tobytes())
-    return whole.hexdigest()
+        combined.update(f"{name} {array.dtype} {array.shape};".encode())
+        combined.update(np.ascontiguousarray(array).tobytes())
+    return combined.hexdigest()
 
 
 @contextmanager

@@ -79,11 +79,11 @@ def opened(sources: Iterable[DatasetSource]) -> tuple[Labelled, ...]:
     ScoringError
         If a capture has no ground truth.
     """
-    found = [Labelled(source.label, ref.open()) for source in sources for ref in source.references()]
-    for one in found:
+    labelled = [Labelled(source.label, ref.open()) for source in sources for ref in source.references()]
+    for one in labelled:
         if one.capture.truth is None:
             raise ScoringError(f"{one.text}: has no ground truth, so nothing can be tuned or shown on it")
-    return tuple(found)
+    return tuple(labelled)
 
 
 def refuse_leaks(tuning: Sequence[Labelled], held_out: Sequence[Labelled], experiment: Experiment | None) -> None:
