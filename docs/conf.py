@@ -16,7 +16,7 @@ exclude_patterns = ["_build", "pictures"]
 myst_enable_extensions = ["deflist"]
 myst_heading_anchors = 3
 
-autodoc_typehints = "none"  # the docstrings tell types with shapes and units
+autodoc_typehints = "none"  # the docstrings give types with shapes and units
 autodoc_member_order = "bysource"
 autodoc_default_options = {"members": True, "show-inheritance": False}
 napoleon_google_docstring = False

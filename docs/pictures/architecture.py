@@ -1,8 +1,8 @@
 """Draw the map of the house from its imports; run as a script it writes ``docs/images/architecture.svg``.
 
-Rooms stand in the order that the layers contract in ``pyproject.toml`` gives them. An arrow says that some module of a
+Rooms are in the order that the layers contract in ``pyproject.toml`` gives them. An arrow says that some module of a
 room imports something of another, also inside a function or for type checkers only; imports that the contract excuses
-by name stand at the left, dashed. What the package ``uwbbench`` itself imports is left out: those are its public names,
+by name are at the left, dashed. What the package ``uwbbench`` itself imports is left out: those are its public names,
 from all rooms. A test compares the stored picture with what
 this script makes of the code.
 """
@@ -77,7 +77,7 @@ def _place(module: str) -> str:
 
 
 def _imported(path: Path) -> set[str]:
-    """Modules that a file names in its imports, wherever they stand; the project has no relative imports."""
+    """Modules that a file names in its imports, wherever they are; the project has no relative imports."""
     names = set()
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Import):

@@ -29,7 +29,7 @@ def fetch(name: str, folder: Path | None = None, progress: Progress | None = Non
     folder : Path, optional
         Data directory that gets the card's folder; by default the cache, where every run searches.
     progress : callable, optional
-        Told which file comes next. Nothing is printed here.
+        Called with what comes next; nothing is printed here.
 
     Returns
     -------

@@ -152,7 +152,7 @@ def leaderboard(
     if out is not None:
         check_site(Path(out))
     verified = read_runs([run.path if isinstance(run, Run) else Path(run) for run in runs], progress)
-    made = Leaderboard(Content(suites(verified), verified))
+    board = Leaderboard(Content(suites(verified), verified))
     if out is not None:
-        made.write(out)
-    return made
+        board.write(out)
+    return board

@@ -83,10 +83,10 @@ def run(
     _check_reach(plan, jobs)
     target = None if out is None else Path(out)
     stored = run_experiment(plan, target, jobs=jobs, resume=resume, progress=progress)
-    made = Run(stored.path, folder)
-    if missing := made.write_reports():
+    finished = Run(stored.path, folder)
+    if missing := finished.write_reports():
         warnings.warn(missing, stacklevel=2)
-    return made
+    return finished
 
 
 def _check_reach(plan: Experiment, jobs: int | None) -> None:

@@ -65,13 +65,13 @@ class DetectorBenchmark:
 
         pipeline = detector if isinstance(detector, Pipeline) else load_detector(detector)
         opened = open_capture(capture) if isinstance(capture, str | Path) else capture
-        whole = opened.frames()
-        if not len(whole):
+        frames = opened.frames()
+        if not len(frames):
             raise CaptureError(f"capture '{opened.name}' has no frames; there is nothing to time")
         self._benchmark.extra_info |= _about(pipeline, opened, "batch" if batch else "stream")
-        warm_up(pipeline, opened, whole, WARM_UP_WINDOWS)
+        warm_up(pipeline, opened, frames, WARM_UP_WINDOWS)
         time = self._batch if batch else self._stream
-        time(pipeline, opened, whole, rounds)
+        time(pipeline, opened, frames, rounds)
 
     def _stream(self, pipeline: Pipeline, capture: Capture, whole: Frames, rounds: int | None) -> None:
         """One frame a round; taking the next frame is not timed."""

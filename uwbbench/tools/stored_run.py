@@ -192,7 +192,7 @@ class Run:
         ConfigError
             If there is no such format.
         StoreError
-            If something else stands there, or it cannot be written.
+            If something else is there, or it cannot be written.
         ReportToolsError
             If the libraries that a page needs are not installed.
         """
@@ -211,7 +211,7 @@ class Run:
         ----------
         folder : str or Path
         force : bool
-            Write into a folder that holds other things.
+            Write into a folder that holds other files.
 
         Returns
         -------
@@ -221,7 +221,7 @@ class Run:
         Raises
         ------
         StoreError
-            If something else stands there, or a file cannot be written.
+            If something else is there, or a file cannot be written.
         ReportToolsError
             If the libraries that draw are not installed.
         """

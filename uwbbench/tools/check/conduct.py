@@ -32,8 +32,8 @@ def same_in_another_process(subject: Subject) -> None:
     if subject.digest_elsewhere != subject.digest:
         found = subject.digest_elsewhere
         is_hash = len(found) == len(subject.digest) and " " not in found
-        told = f"hash {found[:12]}, here {subject.digest[:12]}" if is_hash else found
-        raise Nonconformity("the same result in another process", told)
+        observed = f"hash {found[:12]}, here {subject.digest[:12]}" if is_hash else found
+        raise Nonconformity("the same result in another process", observed)
 
 
 @check("uwbbench.api.stage.Stage")
@@ -57,7 +57,7 @@ def inputs_unchanged(subject: Subject) -> None:
 
 @check("uwbbench.api.stage.Stage.note")
 def prints_nothing(subject: Subject) -> None:
-    """Nothing is printed: the output belongs to the command, and readers of results are told things by ``note``."""
+    """Nothing is printed: the output belongs to the command, and readers of results learn by ``note``."""
     out = io.StringIO()
     with contextlib.redirect_stdout(out), contextlib.redirect_stderr(out):
         subject.result()
@@ -74,8 +74,8 @@ def warns_of_nothing(subject: Subject) -> None:
         subject.result()
     if caught:
         first = caught[0]
-        told = f"{first.category.__name__}: {first.message} ({os.path.basename(first.filename)}:{first.lineno})"  # noqa: PTH119
-        raise Nonconformity("no warning", told)
+        observed = f"{first.category.__name__}: {first.message} ({os.path.basename(first.filename)}:{first.lineno})"  # noqa: PTH119
+        raise Nonconformity("no warning", observed)
 
 
 @check("uwbbench.api.stage.Stage")

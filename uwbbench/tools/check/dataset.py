@@ -272,11 +272,11 @@ def capture_can_be_kept(subject: DatasetSubject) -> None:
 def detectors_take_it(subject: DatasetSubject) -> str:
     """A detector that answers in every frame without looking does so on the first capture."""
     capture = subject.capture
-    found = detector_from_yaml(_ONE_A_FRAME.format(registry.default("stage.constant"))).run(capture)
+    detections = detector_from_yaml(_ONE_A_FRAME.format(registry.default("stage.constant"))).run(capture)
     expected = int(capture.frames().valid.sum())
-    if len(found) != expected:
-        raise Nonconformity(f"{expected} detections, one for each valid frame", str(len(found)))
-    return f"{len(found)} detections"
+    if len(detections) != expected:
+        raise Nonconformity(f"{expected} detections, one for each valid frame", str(len(detections)))
+    return f"{len(detections)} detections"
 
 
 CHECKS = (

@@ -39,8 +39,8 @@ def origin_is_stated(subject: ClassSubject) -> str:
     if fidelity not in FIDELITIES:
         raise Nonconformity(f"fidelity {', '.join(FIDELITIES)}", repr(fidelity))
     module = inspect.getmodule(subject.cls)
-    told = f"{subject.cls.__doc__}\n{module.__doc__ if module else ''}"
-    if fidelity in FIDELITIES[:2] and not _SOURCE.search(told):
+    docs = f"{subject.cls.__doc__}\n{module.__doc__ if module else ''}"
+    if fidelity in FIDELITIES[:2] and not _SOURCE.search(docs):
         raise Nonconformity(
             f"a citation beside fidelity '{fidelity}', such as a year, an arXiv number or a DOI",
             "none in the docstrings of class and module",
@@ -74,8 +74,8 @@ def defaults_are_valid(subject: ClassSubject) -> None:
             try:
                 TypeAdapter(annotated).validate_python(field.get_default(call_default_factory=True))
             except ValidationError as error:
-                told = f"{name}: {error.errors(include_url=False)[0]['msg']}"
-                raise Nonconformity("defaults that their own limits allow", told) from error
+                observed = f"{name}: {error.errors(include_url=False)[0]['msg']}"
+                raise Nonconformity("defaults that their own limits allow", observed) from error
     working_params(subject.cls.params_type(), subject.given, f"{subject.kind} '{subject.name}'", subject.name)
 
 
@@ -88,10 +88,10 @@ def unknown_parameters_are_refused(subject: ClassSubject) -> None:
     except ConfigError as error:
         if "mine.yaml:3" in str(error) and "unknown key 'no_such_parameter'" in str(error):
             return
-        found = f"the message {str(error).partition(chr(10))[0]!r}"
+        observed = f"the message {str(error).partition(chr(10))[0]!r}"
     else:
-        found = "that the parameter was taken"
-    raise Nonconformity("an error that names file, line and key; derive the model from uwbbench.api.Params", found)
+        observed = "that the parameter was taken"
+    raise Nonconformity("an error that names file, line and key; derive the model from uwbbench.api.Params", observed)
 
 
 @check("uwbbench.api.stage.Params")

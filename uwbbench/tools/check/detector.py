@@ -63,8 +63,8 @@ class DetectorSubject(Subject):
 
     def input_arrays(self) -> Mapping[str, NDArray[Any]]:
         """Arrays of the usual capture."""
-        whole = {**vars(self.capture), **vars(self.capture.trajectory)}
-        return {name: value for name, value in whole.items() if isinstance(value, np.ndarray)}
+        parts = {**vars(self.capture), **vars(self.capture.trajectory)}
+        return {name: value for name, value in parts.items() if isinstance(value, np.ndarray)}
 
 
 def values_of(found: Detections) -> Values:
@@ -118,23 +118,25 @@ def identity_is_stable(subject: DetectorSubject) -> str:
 @check(_PIPELINE)
 def detections_have_a_range(subject: DetectorSubject) -> str:
     """There is a column ``range_m``, finite or NaN: what has no range cannot be scored."""
-    found = subject.found
-    if "range_m" not in found:
-        raise Nonconformity("a column range_m; put the stage 'range' at the end", f"columns {', '.join(found.columns)}")
-    infinite = [name for name, values in found.columns.items() if np.isinf(values).any()]
+    detections = subject.found
+    if "range_m" not in detections:
+        raise Nonconformity(
+            "a column range_m; put the stage 'range' at the end", f"columns {', '.join(detections.columns)}"
+        )
+    infinite = [name for name, values in detections.columns.items() if np.isinf(values).any()]
     if infinite:
         raise Nonconformity("no infinite value", f"some in {', '.join(infinite)}")
-    return f"{len(found)} detections in {len(found.processed)} frames"
+    return f"{len(detections)} detections in {len(detections.processed)} frames"
 
 
 @check(_PIPELINE)
 def every_valid_frame_is_processed(subject: DetectorSubject) -> None:
     """All valid frames count as looked at and no invalid one does, and detections lie in the former."""
     valid = np.flatnonzero(subject.capture.frames().valid)
-    found = subject.found
-    if not np.array_equal(found.processed, valid):
-        raise Nonconformity(f"{len(valid)} processed frames", f"{len(found.processed)}, or others")
-    strange = ~np.isin(found.frame, valid)
+    detections = subject.found
+    if not np.array_equal(detections.processed, valid):
+        raise Nonconformity(f"{len(valid)} processed frames", f"{len(detections.processed)}, or others")
+    strange = ~np.isin(detections.frame, valid)
     if strange.any():
         raise Nonconformity("detections in valid frames", f"{int(strange.sum())} in others")
 
@@ -168,14 +170,14 @@ def streams_share_nothing(subject: DetectorSubject) -> None:
 def _on(subject: DetectorSubject, capture: Capture) -> str:
     """Say how the detector takes to a capture: it runs alike in pieces, or refuses with a message for users."""
     try:
-        found = subject.pipeline.run(capture)
+        detections = subject.pipeline.run(capture)
     except ConfigError as error:
         if "\n" in str(error):
             raise Nonconformity("one message", f"{str(error).count(chr(10)) + 1} lines") from error
         return f"refused: {error}"
     pieces, _ = streamed(subject.pipeline, capture, CUTS["uneven blocks"])
-    same(values_of(found), values_of(pieces), "in uneven blocks what the whole capture gives")
-    return f"{len(found)} detections" + (f"; {'; '.join(found.notes)}" if found.notes else "")
+    same(values_of(detections), values_of(pieces), "in uneven blocks what the whole capture gives")
+    return f"{len(detections)} detections" + (f"; {'; '.join(detections.notes)}" if detections.notes else "")
 
 
 @check("uwbbench.config.detector.StepModel")
@@ -187,10 +189,10 @@ def captures_without_sts_are_fine(subject: DetectorSubject) -> str:
 @check("uwbbench.api.stage.Stage")
 def captures_without_truth_are_fine(subject: DetectorSubject) -> str:
     """Without ground truth a detector that is not a reference finds the same: no real radar has it."""
-    found = _on(subject, usual_capture(truth=False))
-    if found.startswith("refused") and subject.pipeline.config.fidelity != "reference":
-        raise Nonconformity("a detector that runs without ground truth, or fidelity: reference", found)
-    return found
+    answer = _on(subject, usual_capture(truth=False))
+    if answer.startswith("refused") and subject.pipeline.config.fidelity != "reference":
+        raise Nonconformity("a detector that runs without ground truth, or fidelity: reference", answer)
+    return answer
 
 
 @check(_PIPELINE)
@@ -213,7 +215,7 @@ def candidates_change_nothing(subject: DetectorSubject) -> str:
     same(values_of(plain), values_of(audited), "the same detections beside their candidates")
     candidates = audited.candidates
     if candidates is None:
-        raise NotApplicable("the detector cannot tell")
+        raise NotApplicable("the detector cannot say")
     retained = int(np.sum(candidates["retained"] == 1)) if "retained" in candidates else 0
     if retained != len(audited):
         raise Nonconformity(f"{len(audited)} retained candidates", str(retained))
@@ -230,11 +232,11 @@ def fused_equals_plain(subject: DetectorSubject) -> str:
     expected, worst = "the rows of the plain stages", 0.0
     same(of_frames(plain), of_frames(subject.found), expected)
     for name, values in plain.columns.items():
-        found = subject.found[name]
-        if not np.array_equal(np.isnan(values), np.isnan(found)):
+        column = subject.found[name]
+        if not np.array_equal(np.isnan(values), np.isnan(column)):
             raise Nonconformity(f"{name} where the plain stages have it", "NaN in other rows")
-        worst = max(worst, float(np.nanmax(np.abs(found - values), initial=0.0)))
-        if not np.allclose(found, values, rtol=1e-9, atol=1e-9, equal_nan=True):
+        worst = max(worst, float(np.nanmax(np.abs(column - values), initial=0.0)))
+        if not np.allclose(column, values, rtol=1e-9, atol=1e-9, equal_nan=True):
             raise Nonconformity(f"{name} within 1e-9 of the plain stages", f"off by up to {worst:.2g}")
     return f"{len(plain)} rows, values within {worst:.2g}"
 

@@ -163,12 +163,12 @@ def unit_is_given(subject: MetricSubject) -> str:
 @check(_METRIC)
 def partials_are_flat_arrays(subject: MetricSubject) -> None:
     """A partial is a one-dimensional float array, of one length for all outcomes where partials are added."""
-    found = [subject.cls.partial(one) for one in subject.outcomes]
-    for part in found:
+    partials = [subject.cls.partial(one) for one in subject.outcomes]
+    for part in partials:
         if not isinstance(part, np.ndarray) or part.ndim != 1 or part.dtype != np.float64:
-            told = f"{part.dtype} of shape {part.shape}" if isinstance(part, np.ndarray) else type(part).__name__
-            raise Nonconformity("float64 arrays of one dimension", told)
-    lengths = {len(part) for part in [*found, subject.cls.partial(empty())]}
+            observed = f"{part.dtype} of shape {part.shape}" if isinstance(part, np.ndarray) else type(part).__name__
+            raise Nonconformity("float64 arrays of one dimension", observed)
+    lengths = {len(part) for part in [*partials, subject.cls.partial(empty())]}
     if subject.cls.merge == "sum" and len(lengths) > 1:
         raise Nonconformity("partials of one length", f"lengths {sorted(lengths)}")
 
@@ -204,10 +204,10 @@ def grouping_does_not_matter(subject: MetricSubject) -> None:
 @check("uwbbench.measure.accuracy.metrics")
 def nothing_is_undefined(subject: MetricSubject) -> None:
     """Without frames the value is NaN with n = 0, no zero and no exception: 0/0 is undefined."""
-    found = bootstrap(subject.cls, [empty()], resamples=20)
+    estimate = bootstrap(subject.cls, [empty()], resamples=20)
     value = subject.cls.value(subject.cls.partial(empty()))
-    if not math.isnan(value) or not math.isnan(found.value) or found.n:
-        raise Nonconformity("NaN with n = 0", f"{value} with n = {found.n}")
+    if not math.isnan(value) or not math.isnan(estimate.value) or estimate.n:
+        raise Nonconformity("NaN with n = 0", f"{value} with n = {estimate.n}")
 
 
 @check(_METRIC)
@@ -226,8 +226,8 @@ def perfection_is_best(subject: MetricSubject) -> str:
     beaten = {name: cls.merit(best) - cls.merit(value) for name, value in others.items()}
     wrong = next((name for name, lead in beaten.items() if lead < -1e-12), None)
     if wrong:
-        told = f"perfect {best:g}, one that {wrong} {others[wrong]:g}, and {cls.better} is better"
-        raise Nonconformity("no flawed detector above the perfect one", told)
+        observed = f"perfect {best:g}, one that {wrong} {others[wrong]:g}, and {cls.better} is better"
+        raise Nonconformity("no flawed detector above the perfect one", observed)
     if not any(lead > 0 for lead in beaten.values()):
         raise Nonconformity("a worse value for some flaw", f"{best:g} for all of {', '.join(others)}")
     return f"perfect: {best:g}"
@@ -236,10 +236,10 @@ def perfection_is_best(subject: MetricSubject) -> str:
 @check("uwbbench.measure.accuracy.stats.bootstrap")
 def interval_brackets_the_value(subject: MetricSubject) -> str:
     """The bootstrap interval over twelve captures is finite and holds the value."""
-    found = bootstrap(subject.cls, subject.outcomes, resamples=300)
-    if not found.low <= found.value <= found.high:
-        raise Nonconformity(f"an interval around {found.value:g}", f"{found.low:g} to {found.high:g}")
-    return f"{found.value:.4g} in {found.low:.4g} to {found.high:.4g}, n = {found.n}"
+    estimate = bootstrap(subject.cls, subject.outcomes, resamples=300)
+    if not estimate.low <= estimate.value <= estimate.high:
+        raise Nonconformity(f"an interval around {estimate.value:g}", f"{estimate.low:g} to {estimate.high:g}")
+    return f"{estimate.value:.4g} in {estimate.low:.4g} to {estimate.high:.4g}, n = {estimate.n}"
 
 
 @check("uwbbench.api.metric.Metric.resampled")
@@ -272,8 +272,10 @@ def open_truth_is_fine(subject: MetricSubject) -> str:
     """Captures whose truth is not exhaustive come through; a metric that is undefined there says so, and no other."""
     value = evaluate(subject.cls, [dataclasses.replace(one, exhaustive=False) for one in subject.outcomes])
     if subject.cls.needs_exhaustive_truth != math.isnan(value):
-        told = f"needs_exhaustive_truth = {subject.cls.needs_exhaustive_truth}"
-        raise Nonconformity(f"needs_exhaustive_truth = {math.isnan(value)}, as the value is {value:.4g} there", told)
+        observed = f"needs_exhaustive_truth = {subject.cls.needs_exhaustive_truth}"
+        raise Nonconformity(
+            f"needs_exhaustive_truth = {math.isnan(value)}, as the value is {value:.4g} there", observed
+        )
     return f"{value:.4g}"
 
 

@@ -55,7 +55,7 @@ def working_params(model: type[Params], given: Mapping[str, Any], subject: str, 
 def _from_detectors(use: str) -> Iterator[dict[str, Any]]:
     """Parameters with which known detectors use a stage."""
     for name in [*shipped("detectors"), *registry.entries("detectors")] if use else ():
-        with contextlib.suppress(UwbbenchError):  # a detector that cannot be read tells nothing
+        with contextlib.suppress(UwbbenchError):  # a detector that cannot be read gives no hint
             yield from (step.params_for(CHANNEL)[0] for step in _steps(name) if step.use == use)
 
 

@@ -38,13 +38,13 @@ def digests_elsewhere(subjects: Sequence[Subject]) -> list[str]:
 def _main() -> None:
     from uwbbench.tools.check.suite import subject_of
 
-    found = []
+    digests = []
     for kind, name, params, roots in json.loads(sys.stdin.read()):
         try:
-            found.append(subject_of(kind, name, params, tuple(map(Path, roots))).digest)
+            digests.append(subject_of(kind, name, params, tuple(map(Path, roots))).digest)
         except Exception as error:  # noqa: BLE001 - a plugin may raise anything
-            found.append(last_line(error))
-    sys.stdout.write("\n" + json.dumps(found))  # on a line of its own, whatever a plugin has printed
+            digests.append(last_line(error))
+    sys.stdout.write("\n" + json.dumps(digests))  # on a line of its own, whatever a plugin has printed
 
 
 if __name__ == "__main__":

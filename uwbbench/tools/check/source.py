@@ -77,15 +77,17 @@ def runs_no_foreign_code(subject: ClassSubject) -> None:
     """Nothing is unpickled or evaluated: a data file must not be able to run code."""
     file, tree = _tree(subject)
     for node in ast.walk(tree):
-        told = next((name for name in _imported(node) if name.partition(".")[0] in _PICKLES), "")
+        unsafe = next((name for name in _imported(node) if name.partition(".")[0] in _PICKLES), "")
         if isinstance(node, ast.Call):
             called = node.func.id if isinstance(node.func, ast.Name) else ""
-            told = f"{called}()" if called in _CODE else told
+            unsafe = f"{called}()" if called in _CODE else unsafe
             if any(_allows_pickle(keyword) for keyword in node.keywords):
-                told = "allow_pickle=True"
-        if told:
+                unsafe = "allow_pickle=True"
+        if unsafe:
             place = f"{file.name}:{getattr(node, 'lineno', 0)}"
-            raise Nonconformity("no pickle, marshal, eval or exec, and numpy files without pickles", f"{place}: {told}")
+            raise Nonconformity(
+                "no pickle, marshal, eval or exec, and numpy files without pickles", f"{place}: {unsafe}"
+            )
 
 
 def _allows_pickle(keyword: ast.keyword) -> bool:

@@ -40,13 +40,13 @@ def _survives(subject: StageSubject, capture: Capture) -> Values:
     block = subject.declared(behind_all(capture, subject.cls.consumes))
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        found = subject.run(block, (1, 7), stage)
-    for name in subject.adds & found.keys():
-        values = found[name]
+        yielded = subject.run(block, (1, 7), stage)
+    for name in subject.adds & yielded.keys():
+        values = yielded[name]
         wrong = ~np.isfinite(values) if name in ("frames", "noise", "profile") else np.isinf(values)
         if wrong.any():
             raise Nonconformity(f"finite values of {name}", f"{int(wrong.sum())} of {values.size} are not")
-    return found
+    return yielded
 
 
 @check(_READ_MORE)

@@ -19,7 +19,7 @@ _STAGE = "uwbbench.api.stage.Stage"
 
 @check(_STAGE)
 def ports_are_sets_of_names(subject: StageSubject) -> str:
-    """Ports are frozen sets of text, made with ``ports``, and what is needed of a capture is one of three things."""
+    """Ports are frozen sets of text, made with ``ports``, and what is needed of a capture is among three names."""
     for attribute in ("consumes", "produces", "removes", "needs"):
         value = getattr(subject.cls, attribute)
         if not isinstance(value, frozenset) or not all(isinstance(port, str) for port in value):
@@ -68,9 +68,9 @@ def declares_what_it_changes(subject: StageSubject) -> None:
         kept = {"frame index", "frames", *PARTS}  # rows were dropped or made: their columns cannot be compared
         before = {name: values for name, values in before.items() if name in kept}
     for name in before.keys() & after.keys() - subject.cls.produces - subject.cls.removes - {"frame index"}:
-        told = difference({name: before[name]}, {name: after[name]})
-        if told:
-            raise Nonconformity(f"'{name}' as it was, or declared in produces", told)
+        deviation = difference({name: before[name]}, {name: after[name]})
+        if deviation:
+            raise Nonconformity(f"'{name}' as it was, or declared in produces", deviation)
 
 
 @check(_STAGE)
@@ -84,17 +84,19 @@ def uses_only_what_it_declares(subject: StageSubject) -> str:
     optional = []
     for port in _undeclared(subject, full):
         try:
-            found = _answer(subject, lacking(full, port))
+            answer = _answer(subject, lacking(full, port))
         except Exception as error:
-            told = f"without it: {last_line(error)}"
-            raise Nonconformity(f"no use of {port}, or its declaration", told) from error
-        told = difference(usual, found)
-        if told and port == "frames":
-            raise Nonconformity("no use of samples, or consumes = ports('frames', ...)", f"other samples give {told}")
-        lost = _lost(usual, found)
+            observed = f"without it: {last_line(error)}"
+            raise Nonconformity(f"no use of {port}, or its declaration", observed) from error
+        deviation = difference(usual, answer)
+        if deviation and port == "frames":
+            raise Nonconformity(
+                "no use of samples, or consumes = ports('frames', ...)", f"other samples give {deviation}"
+            )
+        lost = _lost(usual, answer)
         if lost:
             raise Nonconformity(f"no use of {port}, or its declaration", f"without it {lost}")
-        optional += [port] if told else []
+        optional += [port] if deviation else []
     return f"optional: {', '.join(optional)}" if optional else ""
 
 
@@ -103,7 +105,7 @@ def _undeclared(subject: StageSubject, full: Block) -> list[str]:
     there = [*PARTS, *full.detections.columns, "detections", "frames"]
     ports = [port for port in dict.fromkeys(there) if port != "frame" and port not in subject.cls.consumes]
     reported = [("STS responses", "sts"), ("reported first path", "first_path")]
-    return ports + [told for told, need in reported if need not in subject.cls.needs]
+    return ports + [label for label, need in reported if need not in subject.cls.needs]
 
 
 def _answer(subject: StageSubject, block: Block) -> Values:
@@ -142,11 +144,11 @@ def rowwise_is_true(subject: StageSubject) -> None:
     if not cls.rowwise or issubclass(cls, Filter):
         raise NotApplicable("the stage does not claim it" if not cls.rowwise else "a filter adds no columns")
     half = np.arange(0, len(subject.block.detections), 2)
-    found = subject.run(subject.block.replace(detections=subject.block.detections.take(half)))
+    values = subject.run(subject.block.replace(detections=subject.block.detections.take(half)))
     expected = {name: subject.usual[name][half] for name in cls.produces if name in subject.usual}
-    told = difference(expected, {name: found[name] for name in expected})
-    if told:
-        raise Nonconformity("the same values for each row, or rowwise = False", told)
+    deviation = difference(expected, {name: values[name] for name in expected})
+    if deviation:
+        raise Nonconformity("the same values for each row, or rowwise = False", deviation)
 
 
 @check("uwbbench.api.stage.Filter")
@@ -171,13 +173,13 @@ def filters_give_a_mask(subject: StageSubject) -> None:
     mask = subject.opened().keep(subject.block)  # type: ignore[attr-defined]
     expected = f"a bool array of shape ({len(subject.block.detections)},)"
     if not isinstance(mask, np.ndarray) or mask.dtype != bool or mask.shape != (len(subject.block.detections),):
-        found = f"{mask.dtype} of shape {mask.shape}" if isinstance(mask, np.ndarray) else type(mask).__name__
-        raise Nonconformity(expected, found)
+        observed = f"{mask.dtype} of shape {mask.shape}" if isinstance(mask, np.ndarray) else type(mask).__name__
+        raise Nonconformity(expected, observed)
 
 
 @check(_STAGE)
 def finds_something(subject: StageSubject) -> str:
-    """A stage that makes detections finds some in the usual capture, whose echo stands 27 dB above the noise."""
+    """A stage that makes detections finds some in the usual capture, whose echo is 27 dB above the noise."""
     if "detections" not in subject.cls.produces:
         raise NotApplicable("the stage makes no detections")
     if subject.cls.fidelity == "reference":

@@ -47,20 +47,20 @@ def instances_share_nothing(subject: StageSubject) -> None:
 
 @check("uwbbench.api.stage.Stage.note")
 def notes_come_from_note(subject: StageSubject) -> str:
-    """Notes are told by ``note``, each once, the same for any cut, and are gone after ``open``."""
+    """Notes are given by ``note``, each once, the same for any cut, and are gone after ``open``."""
     stage = subject.opened()
     subject.run(subject.block, stage=stage)
-    whole = list(stage.notes)
-    if not all(isinstance(note, str) for note in whole) or len(set(whole)) < len(whole):
-        raise Nonconformity("texts, each once", repr(whole))
+    notes = list(stage.notes)
+    if not all(isinstance(note, str) for note in notes) or len(set(notes)) < len(notes):
+        raise Nonconformity("texts, each once", repr(notes))
     subject.reopen(stage)
     at_start = list(stage.notes)
     subject.run(subject.block, CUTS["single frames"], stage=stage)
-    if stage.notes != whole:
-        raise Nonconformity(f"the same notes for single frames: {whole}", str(stage.notes))
+    if stage.notes != notes:
+        raise Nonconformity(f"the same notes for single frames: {notes}", str(stage.notes))
     if at_start != subject.opened().notes:
         raise Nonconformity("no notes of the stream before", str(at_start))
-    return f"{len(whole)} notes"
+    return f"{len(notes)} notes"
 
 
 @check("uwbbench.measure.latency")
@@ -71,13 +71,13 @@ def one_frame_is_in_time(subject: StageSubject) -> str:
     """
     blocks = pieces(subject.block, CUTS["single frames"])[:CALLS]
     own_s, period_s = call_s(subject.opened().step, blocks), 1 / subject.capture.radar.frame_rate_hz
-    told = f"{own_s * 1e6:.0f} us a call"
+    observed = f"{own_s * 1e6:.0f} us a call"
     if "stage.idle" in registry.entries("defaults"):
         nothing = StageSubject(registry.default("stage.idle")).opened()
-        told += f", {own_s / call_s(nothing.step, blocks):.1f} times doing nothing"
+        observed += f", {own_s / call_s(nothing.step, blocks):.1f} times doing nothing"
     if own_s > period_s:
-        raise Nonconformity(f"a call for one frame within {period_s * 1e3:.1f} ms", told)
-    return told
+        raise Nonconformity(f"a call for one frame within {period_s * 1e3:.1f} ms", observed)
+    return observed
 
 
 @check(_STAGE)
@@ -86,10 +86,10 @@ def no_rows_are_fine(subject: StageSubject) -> None:
     if "detections" not in subject.cls.consumes:
         raise NotApplicable("the stage consumes no detections")
     nothing = subject.block.detections.take(np.empty(0, np.int64))
-    found = subject.run(subject.block.replace(detections=nothing), CUTS["blocks of 7"])
-    if len(found["detections"]):
-        raise Nonconformity("no detections", f"{len(found['detections'])}")
-    missing = sorted(subject.cls.produces - found.keys())
+    values = subject.run(subject.block.replace(detections=nothing), CUTS["blocks of 7"])
+    if len(values["detections"]):
+        raise Nonconformity("no detections", f"{len(values['detections'])}")
+    missing = sorted(subject.cls.produces - values.keys())
     if missing:
         raise Nonconformity("the declared columns, empty", f"no {', '.join(missing)}")
 
@@ -98,9 +98,9 @@ def no_rows_are_fine(subject: StageSubject) -> None:
 def no_frames_are_fine(subject: StageSubject) -> None:
     """A block without frames comes through, as does a stream without blocks: a capture may be empty."""
     empty = cut(subject.block, 0, 0)
-    found = subject.run(empty)
-    if len(found["detections"]) or len(found["frame index"]):
-        raise Nonconformity("nothing", f"{len(found['detections'])} detections in {len(found['frame index'])} frames")
+    values = subject.run(empty)
+    if len(values["detections"]) or len(values["frame index"]):
+        raise Nonconformity("nothing", f"{len(values['detections'])} detections in {len(values['frame index'])} frames")
     subject.opened().flush()
 
 

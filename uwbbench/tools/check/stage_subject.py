@@ -122,14 +122,14 @@ def declared_parts(block: Block, consumes: frozenset[str], needs: frozenset[str]
     """
     columns: dict[str, Any] = {n: v for n, v in block.detections.columns.items() if n == "frame" or n in consumes}
     frame = columns.pop("frame")
-    found = Detections.empty(block.frames.index)
+    kept = Detections.empty(block.frames.index)
     if "detections" in consumes:
-        found = Detections(frame, processed=block.frames.index, **columns)
+        kept = Detections(frame, processed=block.frames.index, **columns)
     parts: dict[str, Any] = {PARTS[port]: None for port in PARTS.keys() - consumes}
     absent = [name for name in ("sts1", "sts2") if "sts" not in needs]
     absent += [name for name in vars(block.frames) if name.startswith("first_path") and "first_path" not in needs]
     frames = _without(block, absent).frames
-    return block.replace(frames=frames, detections=found, **parts)
+    return block.replace(frames=frames, detections=kept, **parts)
 
 
 def lacking(block: Block, port: str) -> Block:
@@ -163,11 +163,11 @@ def behind_all(capture: Capture, consumes: frozenset[str]) -> Block:
         If no installed stage makes one of them.
     """
     block = Block(frames_of(capture))
-    made = frozenset({"frames"})
+    ports = frozenset({"frames"})
     for name in _makers():
-        block, made = _through(name, block, made, capture)
-    for port in sorted(consumes - made):
-        block, made = _with_port(port, block, made, capture)
+        block, ports = _through(name, block, ports, capture)
+    for port in sorted(consumes - ports):
+        block, ports = _with_port(port, block, ports, capture)
     return block
 
 
@@ -178,9 +178,9 @@ def _makers() -> list[str]:
     """
     waiting = {name: registry.load_plugin("stages", name) for name in registry.makers().values()}
     chain: list[str] = []
-    made = frozenset({"frames"})
-    while ready := next((name for name, cls in waiting.items() if cls.consumes <= made), None):
-        made |= waiting.pop(ready).produces
+    ports = frozenset({"frames"})
+    while ready := next((name for name, cls in waiting.items() if cls.consumes <= ports), None):
+        ports |= waiting.pop(ready).produces
         chain.append(ready)
     return chain
 

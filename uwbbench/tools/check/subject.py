@@ -80,10 +80,12 @@ class ClassSubject(Subject):
         super().__init__(name, params, roots)
         kind: Any = f"{self.kind}s"
         self.cls: Any = registry.load_plugin(kind, name)
-        found = registry.entry(kind, name)
-        self.package = found.package.partition(" ")[0]
+        registered = registry.entry(kind, name)
+        self.package = registered.package.partition(" ")[0]
         if not issubclass(registry.load_plugin(kind, name), self.base):
-            raise PluginError(f"{self.kind} '{name}' of {found.package}: {found.target} is no {self.base.__name__}")
+            raise PluginError(
+                f"{self.kind} '{name}' of {registered.package}: {registered.target} is no {self.base.__name__}"
+            )
         if self.given and self.kind == "metric":
             raise ConfigError(f"metric '{name}' has no parameters; {', '.join(self.given)} cannot be set")
         if self.given:
@@ -92,5 +94,5 @@ class ClassSubject(Subject):
     @property
     def source_file(self) -> Path | None:
         """File that the class is written in."""
-        found = inspect.getsourcefile(self.cls)
-        return Path(found) if found else None
+        file = inspect.getsourcefile(self.cls)
+        return Path(file) if file else None

@@ -80,7 +80,7 @@ def _row(result: CheckResult) -> dict[str, Any]:
 
 
 def all_checks(kind: AuthoredKind) -> tuple[Check, ...]:
-    """Every check that a kind of plugin is put to, in order."""
+    """Every check of a kind of plugin, in order."""
     return _CHECKS[kind] + (tuple(_of_detectors(case) for case in all_cases()) if kind == "detector" else ())
 
 
@@ -102,11 +102,11 @@ def kinds_of(name: str) -> tuple[AuthoredKind, ...]:
         return ("detector",)
     known = {kind: list(registry.entries(f"{kind}s")) for kind in AUTHORED_KINDS}
     known["detector"] += shipped("detectors")
-    found = tuple(kind for kind in AUTHORED_KINDS if name in known[kind])
-    if not found:
+    kinds = tuple(kind for kind in AUTHORED_KINDS if name in known[kind])
+    if not kinds:
         every = [other for names in known.values() for other in names]
         raise PluginError(f"no stage, detector, dataset or metric named '{name}'.{nearest(name, every)}")
-    return found
+    return kinds
 
 
 def subject_of(
@@ -133,7 +133,7 @@ def subject_of(
 
 
 def examine(subject: Subject, names: Sequence[str] | None = None) -> Conformance:
-    """Put the checks of its kind to a plugin.
+    """Hold a plugin against the checks of its kind.
 
     Parameters
     ----------
@@ -187,7 +187,7 @@ def checks_for(
 
 
 def assert_conforms(one: Check, subject: Subject) -> None:
-    """Put one check to a plugin, as a test does.
+    """Hold a plugin against one check, as a test does.
 
     Raises
     ------

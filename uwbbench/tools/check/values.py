@@ -21,7 +21,7 @@ Values = dict[str, NDArray[Any]]
 def of_blocks(blocks: Iterable[Block]) -> Values:
     """What consecutive blocks hold, by port; ``detections`` is the frame of each."""
     parts: dict[str, list[NDArray[Any]]] = {}
-    found = []
+    detections = []
     for block in blocks:
         held = {
             "frame index": block.frames.index,
@@ -33,8 +33,8 @@ def of_blocks(blocks: Iterable[Block]) -> Values:
         for name, array in held.items():
             if array is not None:
                 parts.setdefault(name, []).append(array)
-        found.append(block.detections)
-    return {name: np.concatenate(arrays) for name, arrays in parts.items()} | of_detections(Detections.join(found))
+        detections.append(block.detections)
+    return {name: np.concatenate(arrays) for name, arrays in parts.items()} | of_detections(Detections.join(detections))
 
 
 def of_detections(found: Detections) -> Values:
@@ -43,13 +43,13 @@ def of_detections(found: Detections) -> Values:
 
 
 def difference(one: Mapping[str, NDArray[Any]], other: Mapping[str, NDArray[Any]]) -> str:
-    """First thing that is not bit-equal, in words with the smallest numbers; empty if nothing is."""
+    """First part that is not bit-equal, and where, in words; empty if all are equal."""
     for name in dict.fromkeys([*one, *other]):
         if name not in one or name not in other:
             return f"'{name}' is there only {'the first' if name in one else 'the second'} time"
-        told = _difference(one[name], other[name])
-        if told:
-            return f"{name}: {told}"
+        deviation = _difference(one[name], other[name])
+        if deviation:
+            return f"{name}: {deviation}"
     return ""
 
 
@@ -84,18 +84,18 @@ def same(one: Mapping[str, NDArray[Any]], other: Mapping[str, NDArray[Any]], exp
     Nonconformity
         With the first difference.
     """
-    told = difference(one, other)
-    if told:
-        raise Nonconformity(expected, told)
+    deviation = difference(one, other)
+    if deviation:
+        raise Nonconformity(expected, deviation)
 
 
 def digest(values: Mapping[str, NDArray[Any]]) -> str:
     """Hash of names, types, shapes and bits."""
-    whole = hashlib.sha256()
+    combined = hashlib.sha256()
     for name, array in values.items():
-        whole.update(f"{name} {array.dtype} {array.shape};".encode())
-        whole.update(np.ascontiguousarray(array).tobytes())
-    return whole.hexdigest()
+        combined.update(f"{name} {array.dtype} {array.shape};".encode())
+        combined.update(np.ascontiguousarray(array).tobytes())
+    return combined.hexdigest()
 
 
 @contextmanager

@@ -3,7 +3,7 @@
 Conventions
 -----------
 * A fixed limit is held against the value on these captures, which a deterministic detector gives again and again; the
-  interval beside it tells how far other captures may lie.
+  interval beside it shows how far other captures may lie.
 * Against a stored run, the difference on the same captures counts, in pairs
   (:func:`uwbbench.measure.accuracy.stats.paired_difference`): a regression is a loss whose whole interval lies beyond
   the tolerance. Both are judged by the gate's own rules, and captures are recognised by their content.
@@ -70,13 +70,13 @@ def found_on(gate: Gate, worker: Worker, ref: CaptureRef) -> Found:
     candidates = any(rule.scoring == "peak" for rule in gate.model.accuracy)
     capture = ref.open()
     with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "found.parquet"
+        path = Path(folder) / "detections.parquet"
         answer = detect(worker, gate.head, ref, candidates=candidates, to=path)
         before_filters = path.with_suffix(".candidates.parquet")
-        found = read_detections(path, before_filters if candidates else None)
+        detections = read_detections(path, before_filters if candidates else None)
     if answer["sha256"] != capture.sha256:
         raise SetUpError(f"capture '{ref.name}' has another content in the environment of the head")
-    return Found(capture, capture.sha256, found)
+    return Found(capture, capture.sha256, detections)
 
 
 def accuracy_check(gate: Gate, rule: AccuracyModel, label: str, found: list[Found]) -> Check:

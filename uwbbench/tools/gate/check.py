@@ -119,8 +119,8 @@ class GateResult:
     @property
     def verdict(self) -> GateVerdict:
         """Gravest verdict of all checks: a proven regression, then what is invalid, then what is inconclusive."""
-        found = {check.verdict for check in self.checks}
-        return next((verdict for verdict in _GRAVITY if verdict in found), GateVerdict.PASS)
+        verdicts = {check.verdict for check in self.checks}
+        return next((verdict for verdict in _GRAVITY if verdict in verdicts), GateVerdict.PASS)
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values for JSON."""

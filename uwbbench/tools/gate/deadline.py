@@ -106,7 +106,7 @@ def share_verdict(missed: int, low: float, high: float, settings: DeadlineModel)
 
 _REASONS = {
     GateVerdict.REGRESSION: "more deadlines missed than allowed",
-    GateVerdict.INCONCLUSIVE: "too few frames to tell the share from its limit",
+    GateVerdict.INCONCLUSIVE: "too few frames to say on which side of its limit the share is",
 }
 _ADVICE = {
     GateVerdict.REGRESSION: "make the head faster, or gate on the machine that the radar will have",

@@ -82,7 +82,7 @@ def _accuracy(gate: Gate, label: str, refs: Sequence[CaptureRef], progress: Prog
     started = perf_counter()
     try:
         with worker_of(gate.head, gate.model.timeout_s) as worker:
-            found = [found_on(gate, worker, ref) for ref in refs]
+            runs = [found_on(gate, worker, ref) for ref in refs]
     except UwbbenchError as error:
         return [
             _invalid("accuracy", f"{rule.metric} ({rule.scoring} scoring) on {label}", str(error)) for rule in rules
@@ -90,7 +90,7 @@ def _accuracy(gate: Gate, label: str, refs: Sequence[CaptureRef], progress: Prog
     checks: list[Check] = []
     for rule in rules:
         name = f"{rule.metric} ({rule.scoring} scoring) on {label}"
-        checks += _made("accuracy", name, partial(_one_accuracy, gate, rule, label, found))
+        checks += _made("accuracy", name, partial(_one_accuracy, gate, rule, label, runs))
     return [replace(check, elapsed_s=(perf_counter() - started) / len(checks)) for check in checks]
 
 

@@ -83,5 +83,7 @@ def _testcase(suite: ET.Element, gate: str, check: Check) -> None:
     if outcome is None:
         return
     said = [part for part in (check.measured_text, check.limit_text, check.advice) if part]
-    told = ET.SubElement(case, outcome, message=one_line(check.reason or check.verdict.value), type=check.verdict.value)
-    told.text = one_line("; ".join(said))
+    element = ET.SubElement(
+        case, outcome, message=one_line(check.reason or check.verdict.value), type=check.verdict.value
+    )
+    element.text = one_line("; ".join(said))

@@ -1,4 +1,4 @@
-"""The rule by which two detectors are told apart in speed, and how it was chosen.
+"""The rule that decides whether two detectors differ in speed, and how it was chosen.
 
 What is measured
 ----------------

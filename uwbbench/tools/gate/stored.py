@@ -56,11 +56,11 @@ class StoredRun:
             if entry is None:
                 damage = "".join(f" {note}." for note in self.folder.damage)
                 raise StoreError(f"{path}: that run has no capture with the content of '{capture}'.{damage}")
-            found = self.folder.detections(entry.unit)
-            self._check(entry, found)
+            detections = self.folder.detections(entry.unit)
+            self._check(entry, detections)
         except (KeyError, TypeError, ValueError, IndexError) as error:
             raise StoreError(f"{path}: is damaged: {type(error).__name__}: {error}") from error
-        return found
+        return detections
 
     def _check(self, entry: Entry, found: Detections) -> None:
         """Score the detections again, and compare with the stored scores: an edit of either shows."""

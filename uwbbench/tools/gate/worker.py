@@ -132,10 +132,10 @@ class Session:
         from uwbbench.run.folder.tables import write_detections
 
         opened = _opened(capture)
-        found = _loaded(detector).run(opened, candidates=candidates)
-        write_detections(Path(to), found)
-        if candidates and found.candidates is not None:
-            write_detections(Path(to).with_suffix(".candidates.parquet"), found.candidates)
+        detections = _loaded(detector).run(opened, candidates=candidates)
+        write_detections(Path(to), detections)
+        if candidates and detections.candidates is not None:
+            write_detections(Path(to).with_suffix(".candidates.parquet"), detections.candidates)
         return {"sha256": opened.sha256, "frames": len(opened)}
 
 

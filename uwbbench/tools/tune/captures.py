@@ -1,4 +1,4 @@
-"""Captures of a tuning: opened, told apart by their content, and sorted into the groups that are tuned separately."""
+"""Captures of a tuning: opened, recognised by their content, and sorted into the groups that are tuned separately."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class Labelled:
     def materials(self) -> tuple[str, ...]:
         """Materials of its obstacles, walls left out."""
         truth = self.capture.truth
-        return tuple(sorted({thing.material for thing in truth.objects if not thing.structure})) if truth else ()
+        return tuple(sorted({item.material for item in truth.objects if not item.structure})) if truth else ()
 
 
 @dataclass(frozen=True)
@@ -79,11 +79,11 @@ def opened(sources: Iterable[DatasetSource]) -> tuple[Labelled, ...]:
     ScoringError
         If a capture has no ground truth.
     """
-    found = [Labelled(source.label, ref.open()) for source in sources for ref in source.references()]
-    for one in found:
+    labelled = [Labelled(source.label, ref.open()) for source in sources for ref in source.references()]
+    for one in labelled:
         if one.capture.truth is None:
             raise ScoringError(f"{one.text}: has no ground truth, so nothing can be tuned or shown on it")
-    return tuple(found)
+    return tuple(labelled)
 
 
 def refuse_leaks(tuning: Sequence[Labelled], held_out: Sequence[Labelled], experiment: Experiment | None) -> None:

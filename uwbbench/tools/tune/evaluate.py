@@ -80,12 +80,12 @@ def outcomes_of(
 
 
 def _judged(found: Detections, one: Labelled, rules: ScoringRules, table: str) -> Outcome:
-    made = outcomes(found, one.capture.header, rules)
-    if table not in made:
+    tables = outcomes(found, one.capture.header, rules)
+    if table not in tables:
         raise ScoringError(f"{one.text}: the detector maps nothing, so that there is no table '{table}'")
-    if not made[table].exhaustive:
+    if not tables[table].exhaustive:
         raise ScoringError(f"{one.text}: its truth is not exhaustive, so that precision and F1 are undefined")
-    return made[table]
+    return tables[table]
 
 
 def scores_of_sets(swept: Swept, one: Labelled, rules: ScoringRules) -> SetScores:

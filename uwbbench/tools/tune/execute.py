@@ -112,13 +112,13 @@ def tune(tuning: Tuning, progress: Progress = lambda _: None) -> TuneOutcome:
             f"{tuning.name}: the tuning captures make none of the groups {', '.join(tuning.model.groups)}"
         )
     swept = {} if tuning.sweep is None else _swept(tuning, captures, progress)
-    found = []
+    tuned = []
     for group in groups:
         progress(f"tuning for {group.text}")
-        found.append(
+        tuned.append(
             _of_grid(tuning, group, swept) if tuning.sweep is not None else _of_search(tuning, group, progress)
         )
-    return TuneOutcome(tuning, tuple(found), captures, held_out, _notes(tuning, captures, found))
+    return TuneOutcome(tuning, tuple(tuned), captures, held_out, _notes(tuning, captures, tuned))
 
 
 def variant(tuning: Tuning, values: Mapping[str, Any]) -> Pipeline:
@@ -130,11 +130,11 @@ def variant(tuning: Tuning, values: Mapping[str, Any]) -> Pipeline:
 def _swept(tuning: Tuning, captures: Sequence[Labelled], progress: Progress) -> dict[int, SetScores]:
     """Scores of all sets of the grid on each capture."""
     assert tuning.sweep is not None  # noqa: S101
-    found = {}
+    scores = {}
     for number, one in enumerate(captures, 1):
         progress(f"{len(tuning.sweep)} sets on capture {number} of {len(captures)}: {one.text}")
-        found[id(one)] = scores_of_sets(tuning.sweep.run(one.capture), one, tuning.rules)
-    return found
+        scores[id(one)] = scores_of_sets(tuning.sweep.run(one.capture), one, tuning.rules)
+    return scores
 
 
 def _of_grid(tuning: Tuning, group: Group, swept: Mapping[int, SetScores]) -> Tuned:
@@ -159,9 +159,9 @@ def _of_search(tuning: Tuning, group: Group, progress: Progress) -> Tuned:
     parts: list[SetScores] = []
 
     def f1_of(values: dict[str, Any]) -> float:
-        made = outcomes_of(variant(tuning, values), group.tuning, tuning.rules, tuning.model.table)
+        judged = outcomes_of(variant(tuning, values), group.tuning, tuning.rules, tuning.model.table)
         tried.append(values)
-        parts.append(SetScores.merged([scores_of(outcome) for outcome in made]))
+        parts.append(SetScores.merged([scores_of(outcome) for outcome in judged]))
         f1 = float(parts[-1].f1[0])
         progress(f"{group.text}: trial {len(tried)} of {model.trials}, F1 {f1:.3f}")
         return 0.0 if np.isnan(f1) else f1
@@ -193,8 +193,8 @@ def _concluded(
     def results(captures: Sequence[Labelled]) -> list[Result | None]:
         if not captures:
             return [None, None]
-        made = [outcomes_of(one, captures, tuning.rules, tuning.model.table) for one in (before, after)]
-        return [result_of(one, tuning.model.intervals, tuning.model.seed) for one in made]
+        judged = [outcomes_of(one, captures, tuning.rules, tuning.model.table) for one in (before, after)]
+        return [result_of(one, tuning.model.intervals, tuning.model.seed) for one in judged]
 
     own_before, own_after = results(group.tuning)
     assert own_before is not None  # noqa: S101
@@ -222,11 +222,11 @@ def _edges(tuning: Tuning, tuned: Tuned) -> list[str]:
         return []
     f1 = tuned.scores.f1.reshape(tuning.sweep.shape)
     chosen = tuple(int(place) for place in np.unravel_index(tuned.best, tuning.sweep.shape))
-    found = []
+    at_edge = []
     for axis, (one, place) in enumerate(zip(tuning.sweep.axes, chosen, strict=True)):
         last = len(one.thresholds) - 1
         if last and place in (0, last):
             beside = (*chosen[:axis], 1 if place == 0 else last - 1, *chosen[axis + 1 :])
             if f1[chosen] > f1[beside]:
-                found.append(one.path)
-    return found
+                at_edge.append(one.path)
+    return at_edge

@@ -17,7 +17,7 @@ def require_optuna() -> None:
     Raises
     ------
     UwbbenchError
-        That tells how to install it.
+        The message says how to install it.
     """
     try:
         import optuna  # noqa: F401

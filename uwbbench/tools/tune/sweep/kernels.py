@@ -24,7 +24,7 @@ def regions(start: IntArray, corner: IntArray, shape: IntArray, count: int) -> t
     start : (frames + 1,) int array
         First peak of each frame, and the number of peaks.
     corner : (peaks, axes) int array
-        Cell of the strictest thresholds that each peak passes. The peaks of a frame stand by rank.
+        Cell of the strictest thresholds that each peak passes. The peaks of a frame are ordered by rank.
     shape : (axes,) int array
         Cells along each axis.
     count : int

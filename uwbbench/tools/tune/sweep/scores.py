@@ -109,33 +109,33 @@ def set_scores(swept: Swept, capture: CaptureHeader, rules: ScoringRules) -> Set
             "depends on each other; score sweep.run(capture).detections(index) for each set instead"
         )
     header = capture.header if isinstance(capture, Capture) else capture
-    found = swept.found
-    nothing = Detections.empty(found.processed)
+    detections = swept.found
+    nothing = Detections.empty(detections.processed)
     if rules.scoring == "peak":
-        nothing = nothing.annotated(candidates=found.candidates)
+        nothing = nothing.annotated(candidates=detections.candidates)
     scene = Scene.of(nothing, header)
     if not scene.truth.exhaustive:
         raise ScoringError(
             f"capture '{header.name}': its truth is not exhaustive, so that precision and F1 are undefined"
         )
-    if len(found) and "range_m" not in found:
+    if len(detections) and "range_m" not in detections:
         raise ScoringError("the detections have no range_m; add the stage 'range' to the detector")
     missed = np.zeros(len(header), np.int64)  # in each frame, where nothing is retained
     missed[scene.scored] = judge(nothing, scene, rules, "filtering").outcome.fn
 
-    apart = scene_of_each(found, scene)
-    alone = found.with_columns(frame=np.arange(len(found)))
+    apart = scene_of_each(detections, scene)
+    alone = detections.with_columns(frame=np.arange(len(detections)))
     single = dataclasses.replace(rules, scoring="object" if rules.scoring == "object" else "frame")
     outcome = judge(alone, apart, single, "filtering").outcome
-    counts = np.zeros((len(found), 4), np.int64)
+    counts = np.zeros((len(detections), 4), np.int64)
     scored = np.flatnonzero(apart.scored)
-    misses_left = outcome.fn if rules.scoring == "object" else missed[found.frame[scored]] * outcome.fn
+    misses_left = outcome.fn if rules.scoring == "object" else missed[detections.frame[scored]] * outcome.fn
     counts[scored, 0], counts[scored, 1] = outcome.tp, outcome.fp
-    counts[scored, 2] = missed[found.frame[scored]] - misses_left
+    counts[scored, 2] = missed[detections.frame[scored]] - misses_left
     has_error = np.isfinite(outcome.error_m)
     row = scored[outcome.error_frame[has_error]]
     counts[row, 3] = 1
-    error_m = np.zeros((len(found), 2))
+    error_m = np.zeros((len(detections), 2))
     error_m[row, 0] = np.abs(outcome.error_m[has_error])
     error_m[row, 1] = error_m[row, 0] ** 2
     unit = 2.0 ** (np.ceil(np.log2(np.maximum(error_m.sum(axis=0), 1e-300))) - 62)

@@ -111,8 +111,8 @@ class Sweep:
         """
         # A kernel may round a logarithm in another way, and asks the plain stages where that could decide: theirs are
         # the values that are compared with thresholds.
-        found = self._whole.run(capture, fused=False)
-        compared = found if self._compared is self._whole else self._compared.run(capture, fused=False)
+        detections = self._whole.run(capture, fused=False)
+        compared = detections if self._compared is self._whole else self._compared.run(capture, fused=False)
         level = np.stack([axis.level(compared) for axis in self.axes], axis=1)
         rows = np.flatnonzero((level > 0).all(axis=1))
         keys: tuple[FloatArray, ...] = (compared.frame.astype(np.float64),)
@@ -122,7 +122,7 @@ class Sweep:
             keys, count = selection.rank(compared), selection.params.count
             rows = rows[~np.isnan(keys[0][rows])]
         rows = rows[ranked(compared.frame[rows], tuple(key[rows] for key in keys))]
-        return Swept.of(self, found, rows, level[rows] - 1, count)
+        return Swept.of(self, detections, rows, level[rows] - 1, count)
 
 
 def _opened(step: Step, channel: int | None) -> RankFilter[RankParams]:
