@@ -381,7 +381,8 @@ def test_another_processor_does_not_load_this_ones_machine_code(source: Path) ->
         "import kernels, numpy as np\nfrom uwbbench.api.compiling import compile_counts\n"
         "print(kernels.total(np.arange(5.0)), compile_counts().fresh)"
     )
-    places = {**os.environ, "PYTHONPATH": str(source.parent), "NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": ""}
+    other = "nehalem" if os.environ.get("NUMBA_CPU_NAME") == "generic" else "generic"
+    places = {**os.environ, "PYTHONPATH": str(source.parent), "NUMBA_CPU_NAME": other, "NUMBA_CPU_FEATURES": ""}
     done = subprocess.run([sys.executable, "-c", script], env=places, capture_output=True, text=True, check=True)
     assert done.stdout == "20.0 2\n"
     assert len(kept(source.parent / "__pycache__")) == 4

@@ -1,5 +1,6 @@
 """Memory that a long stream keeps."""
 
+import math
 import sys
 
 import numpy as np
@@ -26,12 +27,20 @@ class Keeping:
         self.kept.append(np.zeros(self.bytes_a_frame, np.uint8))
 
 
+@pytest.fixture
+def patient(monkeypatch: pytest.MonkeyPatch) -> None:
+    """All frames are watched, however slow the machine."""
+    monkeypatch.setattr(memory, "LIMIT_S", math.inf)
+
+
+@pytest.mark.usefixtures("patient")
 def test_what_a_stream_keeps_of_each_frame_is_found(approach: Capture) -> None:
     found = memory.growth(Keeping(4000), approach, approach.frames(0, 40))  # type: ignore[arg-type]
     assert found["memory_growth_bytes"] == pytest.approx(4e6, rel=0.1)
     assert found["growth_frames"] == memory.MEASURED_FRAMES
 
 
+@pytest.mark.usefixtures("patient")
 def test_a_stream_that_keeps_nothing_does_not_grow(approach: Capture) -> None:
     found = memory.growth(load_detector("null"), approach, approach.frames(0, 40))
     assert found["memory_growth_bytes"] is not None

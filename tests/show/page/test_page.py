@@ -80,9 +80,10 @@ def test_every_chart_follows_the_schema_of_vega_lite_and_says_that_it_is_simulat
         "radargram",
         "map",
     }
-    for picture in pictures:
-        altair.Chart.from_dict(picture.spec, validate=True)
-        assert "SIMULATED" in picture.spec["title"]["text"]
+    assert all("SIMULATED" in picture.spec["title"]["text"] for picture in pictures)
+    # One of each kind and quantity: the others differ in their data alone.
+    for spec in {re.sub(r"-\d(-[a-z]+-[a-z]+)?", "", picture.name): picture.spec for picture in pictures}.values():
+        altair.Chart.from_dict(spec, validate=True)
 
 
 def test_the_summary_names_captures_leader_error_and_cost(content: Content) -> None:
