@@ -116,10 +116,6 @@ DAMAGE = {
     "detectors are a number": (lambda run: edit_manifest(run, lambda m: m["experiment"].update(detectors=3)), "edited"),
     "no sessions": (lambda run: edit_manifest(run, lambda m: m.update(sessions=[])), "edited"),
     "a later format": (lambda run: edit_manifest(run, lambda m: m.update(format_version=9)), "expected uwbbench-run"),
-    "an unknown metric": (
-        lambda run: edit_manifest(run, lambda m: m["experiment"].update(metrics=["os.system"])),
-        "os.system",
-    ),
     "manifest cut short": (
         lambda run: (run / "manifest.json").write_text((run / "manifest.json").read_text()[:500]),
         "not valid JSON",
