@@ -212,7 +212,7 @@ class BothWays(Pipeline):
 def test_all_hard_cases_find_the_same_fused_and_plain(name):
     detector = BothWays(load_detector(name).config)
     outcome = examine(detector)
-    assert [one.case for one in outcome.outcomes if one.status == "failed"] == []
+    assert [one.check for one in outcome.results if one.status == "failed"] == []
     assert detector.compared >= 15
 
 
