@@ -76,6 +76,7 @@ def test_a_gate_that_holds_is_exit_code_0_and_is_told_for_people(uwbbench, make_
         assert text in done.stdout
     assert "PASS (exit code 0)" in done.stdout
     assert "accuracy on plate" in done.stderr
+    make_gate(accuracy="[{metric: f1, scoring: frame, minimum: 0.5}]")
     assert uwbbench("gate", "gate.yaml", "--quiet").stderr == ""
 
 

@@ -6,22 +6,23 @@ from pathlib import Path
 import pytest
 
 import uwbbench
+from tests.fixtures.shared import Once
 
 SMALL = {
     "name": "small",
     "detectors": ["paper", "cfar-os"],
     "datasets": [{"use": "approach", "name": "plates", "params": {"speed_m_s": 3.0, "runs": 3}}],
     "scoring": "frame",
-    "latency": {"frames": 20},
+    "latency": {"frames": 20, "blocks": 8},
     "stability": False,
     "intervals": {"resamples": 100},
 }
 
 
 @pytest.fixture(scope="session")
-def made(tmp_path_factory) -> uwbbench.Run:
+def made(once: Once) -> uwbbench.Run:
     """Two detectors on three simulated captures, timed."""
-    return uwbbench.run(SMALL, tmp_path_factory.mktemp("library") / "small", jobs=1)
+    return uwbbench.open_run(once("library", lambda folder: uwbbench.run(SMALL, folder / "small", jobs=1)) / "small")
 
 
 @pytest.fixture

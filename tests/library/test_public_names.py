@@ -93,6 +93,7 @@ def test_importing_the_package_imports_nothing_heavy(tmp_path):
     assert done.returncode == 0, done.stderr
 
 
+@pytest.mark.slow
 def test_a_type_checker_sees_the_function(tmp_path):
     (tmp_path / "user.py").write_text(
         textwrap.dedent(

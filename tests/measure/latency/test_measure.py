@@ -92,7 +92,7 @@ def test_a_detector_that_does_three_times_the_work_is_found_slower(
     text = "schema: 1\nname: {0}\npipeline:\n  - {{use: test.busy, params: {{rounds: {1}}}}}\n"
     (tmp_path / "once.yaml").write_text(text.format("once", 2))
     thrice = detector_from_text(text.format("thrice", 6))
-    found = measure(REF, thrice, LatencyModel(reference=str(tmp_path / "once.yaml"))).ratio_to_reference
+    found = measure(REF, thrice, LatencyModel(reference=str(tmp_path / "once.yaml"), blocks=31)).ratio_to_reference
     assert found is not None
     assert found["reference"] == "once"
     assert found["low"] > 1
