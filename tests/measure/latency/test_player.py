@@ -123,7 +123,7 @@ def test_a_wait_longer_than_what_was_timed_is_none_of_it(approach: Capture, monk
     [
         ([1e-6, 1e-5], 15_000, 1500),  # 1.5 ms of the faster
         ([1e-4, 1e-4], 6400, 64),  # work that comes every fifty frames is part of every turn
-        ([1e-6, 0.05], 1000, 5),  # a quarter of a second of the slower at most
+        ([1e-6, 0.005], 1000, 6),  # thirty milliseconds of the slower at most
         ([1.0, 2.0], 1000, 1),
         ([1e-4, 1e-4], 100, 100),  # equal parts, of which no frame is left over
         ([1e-4, 1e-4], 130, 65),

@@ -2,11 +2,11 @@
 
 What a turn is
 --------------
-* A turn is the time of some consecutive frames of a capture, one frame a call. It lasts ``TURN_S`` or longer: thousands
-  of readings of the clock, and less than the time slice of another process.
-* It has ``TURN_FRAMES`` frames or more, so that work that comes every fifty, such as clustering, is part of every turn,
-  unless a detector is so slow that it would take longer than ``LONGEST_TURN_S`` for them. The parts of a capture are
-  equally long, and next to nothing of it is left over.
+* A turn is the time of some consecutive frames of a capture, one frame a call. It lasts ``TURN_S`` or longer, thousands
+  of readings of the clock, and has ``TURN_FRAMES`` frames or more, so that work that comes every fifty, such as
+  clustering, is part of every turn. Both hold unless the slowest detector would take longer than ``LONGEST_TURN_S`` for
+  them: beside a fast reference, a slow one would be timed for minutes. The parts of a capture are equally long, and
+  next to nothing of it is left over.
 * Both turns of a block are the same work: a detector has two streams, which go through the same frames one after the
   other, so that the faster of both is the less disturbed one and never the one that had less to do.
 * On a busy machine other processes take the core for milliseconds. Linux counts for each thread how long it waited for
@@ -38,7 +38,7 @@ from uwbbench.measure.latency.ratio import alternate
 
 TURN_S = 1.5e-3
 TURN_FRAMES = 64
-LONGEST_TURN_S = 0.25
+LONGEST_TURN_S = 0.03
 
 PROBED_S = 0.01
 """Time after which a detector's speed is known well enough to choose the length of its turns."""
