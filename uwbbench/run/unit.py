@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import signal
 import threading
 import time
 import traceback
@@ -13,6 +12,7 @@ from typing import Any
 
 from uwbbench.api.capture import Capture, CaptureHeader
 from uwbbench.api.detections import Detections
+from uwbbench.api.interruption import by_plugin, leave_to_parent
 from uwbbench.config.source import CaptureRef
 from uwbbench.detect.pipeline import Pipeline
 from uwbbench.measure.accuracy.scoring import ScoringRules
@@ -76,15 +76,17 @@ def content_of(job: Job) -> str:
     """SHA-256 of a unit's capture; empty where it cannot be opened."""
     try:
         return _opened(job.session, job.unit.ref).sha256
-    except Exception:  # noqa: BLE001 - the unit itself will fail in the same way, and say so
-        return ""
+    except BaseException as error:
+        if not by_plugin(error):
+            raise
+        return ""  # the unit itself will fail in the same way, and say so
 
 
 def die_with(parent: int) -> None:
     """Make a worker leave the interrupt key to its parent, and end when the parent has ended, however it ended."""
     if os.getpid() == parent or threading.current_thread() is not threading.main_thread():
         return
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    leave_to_parent()
 
     def watch() -> None:
         while os.getppid() == parent:
@@ -105,7 +107,9 @@ def run_unit(job: Job) -> Finished:
     try:
         with threadpool_limits(1):
             finished = _detected(job)
-    except Exception as error:  # noqa: BLE001 - a plugin may raise anything; the other units still run
+    except BaseException as error:  # a plugin may raise anything; the other units still run
+        if not by_plugin(error):
+            raise
         return Finished(entry_of(unit, "failed", reason=reason_of(error), traceback=traceback.format_exc()))
     finished.entry.facts["elapsed_s"] = time.perf_counter() - started
     return finished

@@ -9,6 +9,7 @@ from typing import Any
 from uwbbench.api.capture import CaptureHeader
 from uwbbench.api.detections import Detections
 from uwbbench.api.errors import PluginError, ScoringError
+from uwbbench.api.interruption import by_plugin
 from uwbbench.api.metric import Metric, Outcome
 from uwbbench.config.rules import RegionModel
 from uwbbench.measure.accuracy.metrics.choice import MetricChoice
@@ -103,7 +104,9 @@ def with_metrics(
 def _value(name: str, metric: type[Metric], outcome: Outcome) -> float | None:
     try:
         value = evaluate(metric, [outcome])
-    except Exception as error:
+    except BaseException as error:
+        if not by_plugin(error):
+            raise
         raise PluginError(
             f"metric '{name}' fails: {type(error).__name__}: {error}; what was detected is stored: mend the metric and "
             "continue the run with --resume"
