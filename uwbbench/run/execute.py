@@ -288,6 +288,8 @@ class _Run:
         if finished.header is not None and finished.found is not None:
             self.folder.write_header(entry.capture_id, finished.header, finished.sha256)
             self.folder.write_detections(entry.unit, finished.found, finished.candidates)
+            if finished.curve is not None:
+                self.folder.write_curve(entry.unit, finished.curve, self.rules[0])
         self._journal(entry)
 
     def _journal(self, entry: Entry) -> None:
