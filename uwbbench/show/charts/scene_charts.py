@@ -12,6 +12,9 @@ from uwbbench.show.charts.chart import Spec, axis, chart, limits
 from uwbbench.show.charts.theme import SERIES
 from uwbbench.show.text.numbers import rounded
 
+DETECTOR = "{detector}"
+"""Stands in a title for the detector that is shown, as the reader may choose another one."""
+
 NEAR = {True: "within the gate", False: "elsewhere"}
 
 
@@ -123,6 +126,12 @@ def top_view(title: str, case: Case, names: Mapping[str, str]) -> Spec:
         }
     )
     return chart(title, "Line: true outline; dashed: robot path.", layers, params=[_chosen(names[placing(case)])])
+
+
+def titled(spec: Spec) -> Spec:
+    """Chart whose title names the detector that is shown at first."""
+    head = spec["title"]
+    return {**spec, "title": {**head, "text": head["text"].replace(DETECTOR, spec["params"][0]["value"])}}
 
 
 def placing(case: Case) -> str:

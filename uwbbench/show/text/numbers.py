@@ -89,6 +89,41 @@ def p_value(p: float) -> str:
     return "<0.001" if p < 0.001 else number(p, 3)
 
 
+def times(ratio: float) -> str:
+    """A ratio as people say it, with two digits that count.
+
+    Parameters
+    ----------
+    ratio : float
+
+    Examples
+    --------
+    >>> times(33.78), times(1.234), times(0.0517), times(12600.0), times(float("nan"))
+    ('34x', '1.2x', '0.052x', '12600x', 'n/a')
+    """
+    return f"{significant(ratio)}x" if math.isfinite(ratio) else UNDEFINED
+
+
+def significant(value: float | None, digits: int = 2) -> str:
+    """Number with so many digits that count, and none of its whole ones lost.
+
+    Parameters
+    ----------
+    value : float or None
+    digits : int
+        Significant digits.
+
+    Examples
+    --------
+    >>> significant(33.78), significant(0.0517), significant(5.28, 3), significant(242.4, 3), significant(20833.3, 3)
+    ('34', '0.052', '5.28', '242', '20833')
+    """
+    if value is None or not math.isfinite(value):
+        return UNDEFINED
+    before = math.floor(math.log10(abs(value))) + 1 if value else 1
+    return f"{value:.{max(digits - before, 0)}f}"
+
+
 def rounded(value: float | None) -> float | None:
     """Number with five significant digits, which is more than any interval or picture bears; None where undefined.
 
