@@ -23,6 +23,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from uwbbench.api.errors import StoreError
+from uwbbench.config.detector import from_results, marked
 from uwbbench.measure.accuracy.metrics.choice import MetricChoice
 from uwbbench.measure.accuracy.stats import Estimate
 from uwbbench.results import published
@@ -30,6 +31,7 @@ from uwbbench.results.limits import Limits
 from uwbbench.results.results import Scored, errors_in, estimates_of, scored
 from uwbbench.run.folder.folder import RunFolder
 from uwbbench.run.folder.journal import Entry
+from uwbbench.run.folder.reported import REPORTED_FACT
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -77,6 +79,7 @@ class Report:
         self.experiment: dict[str, Any] = folder.manifest["experiment"]
         self.entries: list[Entry] = folder.entries()
         self.detectors: list[str] = [config["name"] for config in self.experiment["detectors"]]
+        self.read_only: set[str] = {one["name"] for one in self.experiment["detectors"] if from_results(one)}
         self.metrics = MetricChoice(self.experiment["metrics"])
         self.settings: dict[str, Any] = {**self.experiment["intervals"], "seed": self.experiment["seed"]}
 
@@ -111,13 +114,22 @@ class Report:
             "errors": errors_in(one.outcome for one in members),
             "exhaustive": all(one.outcome.exhaustive for one in members),
             "chance_recall": float((chance * truths).sum() / truths.sum()) if truths.sum() else math.nan,
+            "results_file": first.detector in self.read_only,
             **self._times(first.detector, first.dataset),
         }
 
     def _times(self, detector: str, dataset: str) -> dict[str, Any]:
-        """Times of a detector: medians over the captures that were timed."""
-        timed = [e.facts for e in self._of_kind("latency") if (e.detector, e.dataset) == (detector, dataset)]
+        """Times of a detector: medians over the captures that were timed, or as its results files report them."""
+        if detector in self.read_only:
+            mine = [e.facts for e in self._of_kind("accuracy") if (e.detector, e.dataset) == (detector, dataset)]
+            timed = [facts[REPORTED_FACT] for facts in mine if REPORTED_FACT in facts]
+        else:
+            timed = [e.facts for e in self._of_kind("latency") if (e.detector, e.dataset) == (detector, dataset)]
         return {key: _median(facts[key] for facts in timed) for key in ("p50_us", "p99_us")}
+
+    def label(self, detector: str, text: str | None = None) -> str:
+        """Name of a detector, or another text for it, as tables show it: marked where its results were read."""
+        return marked(text or detector, results_file=detector in self.read_only)
 
     def _of_kind(self, kind: str) -> list[Entry]:
         return [entry for entry in self.entries if entry.kind == kind and entry.status == "done"]

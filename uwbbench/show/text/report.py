@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +11,7 @@ from uwbbench.measure.accuracy.metrics.choice import MetricChoice
 from uwbbench.measure.accuracy.stats import MINIMUM_GROUPS
 from uwbbench.results.report import Report
 from uwbbench.show.text.limits_sheets import limits_sheets
-from uwbbench.show.text.numbers import interval, number
+from uwbbench.show.text.numbers import interval, number, time_us
 from uwbbench.show.text.paper_sheets import paper_sheets
 from uwbbench.show.text.quantity import Quantity, undefined_titles
 from uwbbench.show.text.sheet import Sheet, escaped, sentence, shown
@@ -46,15 +46,15 @@ class Tables:
 
     def leaderboards(self) -> Iterator[Sheet]:
         """One for each dataset, scoring and table."""
-        return _leaderboards(self._report)
+        return self._labelled(_leaderboards(self._report))
 
     def paper(self) -> Iterator[Sheet]:
         """The two tables of arXiv 2512.01018."""
-        return paper_sheets(self._report)
+        return self._labelled(paper_sheets(self._report))
 
     def limits(self) -> Iterator[Sheet]:
         """Detectors against physical limits, where the run has test signals."""
-        return limits_sheets(self._report.limits)
+        return self._labelled(limits_sheets(self._report.limits))
 
     def latency(self) -> Iterator[Sheet]:
         """Times of every detector and timed capture."""
@@ -80,13 +80,18 @@ class Tables:
                 (str(e.kind), shown(e.detector), shown(e.dataset), shown(e.capture), sentence(e.reason))
                 for e in self._report.failures
             )
-            yield Sheet("Failed", ("what", "detector", "dataset", "capture", "reason"), failed)
+            yield from self._labelled([Sheet("Failed", ("what", "detector", "dataset", "capture", "reason"), failed)])
         if self._report.unscored:
             rows = tuple(
                 (shown(e.detector), shown(e.capture), scoring, sentence(reason))
                 for e, scoring, reason in self._report.unscored
             )
-            yield Sheet("Not scored", ("detector", "capture", "scoring", "reason"), rows)
+            yield from self._labelled([Sheet("Not scored", ("detector", "capture", "scoring", "reason"), rows)])
+
+    def _labelled(self, tables: Iterable[Sheet]) -> Iterator[Sheet]:
+        """Tables that mark the rows of detectors whose results were read from files."""
+        labels = {shown(name): self._report.label(name, shown(name)) for name in self._report.read_only}
+        return (table.renamed("detector", labels) for table in tables)
 
 
 def markdown(report: Report) -> str:
@@ -128,7 +133,7 @@ def _leaderboards(report: Report) -> Iterator[Sheet]:
             cells = [interval(e.value, e.low, e.high, by.digits, by.factor) for e, by in shown_here]
             cells += [number(about["chance_recall"], 3)] if open_world else []
             frames = f"{about['scored_frames']} of {about['frames']}"
-            cells += [str(about["errors"]), frames, number(about["p50_us"], 0), number(about["p99_us"], 0)]
+            cells += [str(about["errors"]), frames, time_us(about, "p50_us"), time_us(about, "p99_us")]
             rows.append((shown(about["detector"]), *cells))
         title = f"{shown(dataset)}, {source.upper()}: {scoring} scoring, {TABLES[table]}"
         notes = tuple(_leaderboard_notes(members, quantities, report.metrics))
