@@ -18,8 +18,9 @@ from uwbbench.results.results import Scored
 from uwbbench.results.slices import Board, Slice, cuts, range_edges_m, slices, span_name
 from uwbbench.show.charts import time_chart
 from uwbbench.show.charts.chart import Spec
+from uwbbench.show.looks import Look, looks
 from uwbbench.show.page.board_charts import BOARD_CHARTS, drawn
-from uwbbench.show.page.looks import look
+from uwbbench.show.page.captures import look
 from uwbbench.show.page.timed import COLUMNS, timed_cells
 from uwbbench.show.text.numbers import rounded
 from uwbbench.show.text.quantity import Quantity
@@ -88,6 +89,11 @@ class Content:
             if about["table"] == "filtering" and (about["scoring"] == first or first not in scorings):
                 leaders.setdefault((about["dataset"], about["source"]), about["detector"])
         return leaders
+
+    @cached_property
+    def marks(self) -> dict[str, Look]:
+        """Look of each detector by its label."""
+        return looks(self.detectors.values())
 
     # Charts ----------------------------------------------------------------------------------------------------
 
@@ -172,6 +178,7 @@ class Content:
         ]
         return {
             "detectors": list(self.detectors.values()),
+            "marks": [[one.path, one.colour] for one in self.marks.values()],
             "quantities": [vars(quantity) for quantity in self.quantities.values()],
             "boards": [self._board(board, materials) for board in boards],
             "spans": self.spans,
