@@ -13,7 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from uwbbench.api import registry
 from uwbbench.api.check import checked
-from uwbbench.api.errors import ConfigError, PluginError
+from uwbbench.api.errors import ConfigError, PluginError, nearest
 from uwbbench.api.locate import find_config
 from uwbbench.api.override import with_values
 from uwbbench.api.yaml_file import YamlFile, parse_yaml, read_yaml
@@ -46,6 +46,11 @@ class DetectorModel(BaseModel):
     description: str = ""
     citation: str = ""
     fidelity: Literal["from-source", "reconstruction", "baseline", "reference"] = "baseline"
+    score: str | None = Field(
+        None,
+        description="Column that orders its candidates in curves without a threshold, larger first; the first of "
+        "score_db, prominence and amplitude that they have if left out.",
+    )
     extends: str | None = Field(None, description="Detector (name or file) that this one changes.")
     set: dict[str, Any] = Field(default_factory=dict, description="Values to change in the extended detector, by path.")
     pipeline: list[StepModel] = Field(min_length=1)
@@ -104,6 +109,8 @@ class DetectorConfig:
     ----------
     name, description, citation, fidelity : str
     steps : tuple of Step
+    score : str
+        Column that orders candidates in curves without a threshold; empty where the file names none.
     """
 
     name: str
@@ -111,11 +118,13 @@ class DetectorConfig:
     description: str = ""
     citation: str = ""
     fidelity: str = "baseline"
+    score: str = ""
 
     def to_dict(self) -> dict[str, Any]:
         """Resolved file as plain values: what a manifest stores and an identity is made of."""
         steps = [{"use": s.use, "as": s.label, "params": s.params, "optional": s.optional} for s in self.steps]
-        return {"schema": 1, "name": self.name, "fidelity": self.fidelity, "pipeline": steps}
+        score = {"score": self.score} if self.score else {}
+        return {"schema": 1, "name": self.name, "fidelity": self.fidelity, **score, "pipeline": steps}
 
 
 KERNEL = "kernel "
@@ -188,7 +197,19 @@ def check_detector(data: Mapping[str, Any], source: YamlFile) -> DetectorConfig:
         step = Step(item.use, label, params, item.optional, source.place(("pipeline", index)))
         _check_params(step, source, index)
         steps.append(step)
-    return DetectorConfig(model.name, tuple(_completed(steps)), model.description, model.citation, model.fidelity)
+    steps = _completed(steps)
+    _check_score(model.score, steps, source)
+    about = model.description, model.citation, model.fidelity
+    return DetectorConfig(model.name, tuple(steps), *about, model.score or "")
+
+
+def _check_score(score: str | None, steps: list[Step], source: YamlFile) -> None:
+    """Check that a step makes the column that orders candidates."""
+    made = {port for step in steps for port in registry.load_plugin("stages", step.use).produces}
+    columns = sorted(made - {"first_path", "noise", "profile", "detections", "cluster"})
+    if score is not None and score not in columns:
+        known = f"{nearest(score, columns)} They make: {', '.join(columns) or 'no column'}"
+        raise ConfigError(f"{source.place(('score',))}: no step makes the column '{score}'.{known}")
 
 
 def _completed(steps: list[Step]) -> list[Step]:

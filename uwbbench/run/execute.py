@@ -5,14 +5,12 @@ from __future__ import annotations
 import dataclasses
 import os
 import re
-import signal
-import threading
 import time
 import traceback
 import uuid
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
@@ -21,6 +19,7 @@ from typing import Any
 from joblib import Parallel, delayed
 
 from uwbbench.api.errors import StoreError, UwbbenchError
+from uwbbench.api.interruption import by_plugin, listening
 from uwbbench.config.detector import DetectorConfig, read_detector
 from uwbbench.detect.pipeline import Pipeline
 from uwbbench.measure.latency.machine import machine, usable_cores
@@ -108,25 +107,12 @@ def run_experiment(
     folder = _resumed(experiment, out, workers) if resume else _created(experiment, out, workers)
     todo = plan(experiment)
     try:
-        with _terminable():
+        with listening():
             _Run(folder, experiment, todo, workers, progress).carry_out()
         folder.seal()
     except KeyboardInterrupt:
         raise Interrupted(folder.path) from None
     return folder
-
-
-@contextmanager
-def _terminable() -> Iterator[None]:
-    """Let a request to terminate end a run as the interrupt key does: results kept, workers gone."""
-    if threading.current_thread() is not threading.main_thread():  # signals reach the main thread only
-        yield
-        return
-    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTERM, before)
 
 
 def _created(experiment: Experiment, out: Path | None, jobs: int) -> RunFolder:
@@ -302,6 +288,8 @@ class _Run:
         if finished.header is not None and finished.found is not None:
             self.folder.write_header(entry.capture_id, finished.header, finished.sha256)
             self.folder.write_detections(entry.unit, finished.found, finished.candidates)
+            if finished.curve is not None:
+                self.folder.write_curve(entry.unit, finished.curve, self.rules[0])
         self._journal(entry)
 
     def _journal(self, entry: Entry) -> None:
@@ -316,7 +304,9 @@ class _Run:
         started = time.perf_counter()
         try:
             latency = measure(unit.ref, unit.detector, self.experiment.latency)
-        except Exception as error:  # noqa: BLE001 - a measurement that fails is a row
+        except BaseException as error:  # a measurement that fails is a row
+            if not by_plugin(error):
+                raise
             self._journal(entry_of(unit, "failed", reason=reason_of(error), traceback=traceback.format_exc()))
             return
         self.folder.write_times(unit.id, latency.times_us, latency.to_dict())

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import signal
 import threading
 import time
 import traceback
@@ -13,12 +12,15 @@ from typing import Any
 
 from uwbbench.api.capture import Capture, CaptureHeader
 from uwbbench.api.detections import Detections
+from uwbbench.api.interruption import by_plugin, leave_to_parent
 from uwbbench.config.source import CaptureRef
 from uwbbench.detect.pipeline import Pipeline
+from uwbbench.measure.accuracy.judge import Scene
+from uwbbench.measure.accuracy.ranked import RankedCounts, ranked
 from uwbbench.measure.accuracy.scoring import ScoringRules
 from uwbbench.run.folder.identity import accuracy_identity
 from uwbbench.run.folder.journal import Entry, Status
-from uwbbench.run.folder.scored import score_rows
+from uwbbench.run.folder.scored import score_rows, with_causes
 from uwbbench.run.plan import Unit, reason_of
 
 
@@ -53,6 +55,8 @@ class Finished:
     header : CaptureHeader or None
     sha256 : str
         Of the capture's content.
+    curve : RankedCounts or None
+        What the candidates would give at every threshold.
     """
 
     entry: Entry
@@ -60,6 +64,7 @@ class Finished:
     candidates: Detections | None = None
     header: CaptureHeader | None = None
     sha256: str = ""
+    curve: RankedCounts | None = None
 
 
 _last: list[tuple[str, CaptureRef, Capture]] = []
@@ -76,15 +81,17 @@ def content_of(job: Job) -> str:
     """SHA-256 of a unit's capture; empty where it cannot be opened."""
     try:
         return _opened(job.session, job.unit.ref).sha256
-    except Exception:  # noqa: BLE001 - the unit itself will fail in the same way, and say so
-        return ""
+    except BaseException as error:
+        if not by_plugin(error):
+            raise
+        return ""  # the unit itself will fail in the same way, and say so
 
 
 def die_with(parent: int) -> None:
     """Make a worker leave the interrupt key to its parent, and end when the parent has ended, however it ended."""
     if os.getpid() == parent or threading.current_thread() is not threading.main_thread():
         return
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    leave_to_parent()
 
     def watch() -> None:
         while os.getppid() == parent:
@@ -105,7 +112,9 @@ def run_unit(job: Job) -> Finished:
     try:
         with threadpool_limits(1):
             finished = _detected(job)
-    except Exception as error:  # noqa: BLE001 - a plugin may raise anything; the other units still run
+    except BaseException as error:  # a plugin may raise anything; the other units still run
+        if not by_plugin(error):
+            raise
         return Finished(entry_of(unit, "failed", reason=reason_of(error), traceback=traceback.format_exc()))
     finished.entry.facts["elapsed_s"] = time.perf_counter() - started
     return finished
@@ -114,11 +123,11 @@ def run_unit(job: Job) -> Finished:
 def _detected(job: Job) -> Finished:
     unit = job.unit
     capture = _opened(job.session, unit.ref)
-    with_candidates = any(rule.scoring == "peak" for rule in job.rules)
     pipeline = Pipeline(unit.detector)
-    detections = pipeline.run(capture)
-    candidates = detections.candidates if with_candidates else None
+    # Kernels count nothing that they drop, so a second pass tells; plain stages do so in the first.
+    detections = pipeline.run(capture, candidates=not pipeline.open(capture).fused)
     header = capture.header
+    rows = score_rows(detections, header, job.rules)
     facts = {
         "source": header.source,
         "frames": len(header),
@@ -136,10 +145,14 @@ def _detected(job: Job) -> Finished:
         "done",
         identity=accuracy_identity(pipeline.identity, capture.sha256, job.rules),
         capture_id=unit.capture_id,
-        scores=score_rows(detections, header, job.rules),
+        scores=with_causes(rows, detections, header, job.rules),
         facts=facts,
     )
-    return Finished(entry, _bare(detections), None if candidates is None else _bare(candidates), header, capture.sha256)
+    scorable = any(row["status"] == "scored" for row in rows)
+    curve = ranked(detections, Scene.of(detections, header), job.rules[0], unit.detector.score) if scorable else None
+    kept = detections.candidates if any(rule.scoring == "peak" for rule in job.rules) else None
+    found = _bare(detections)
+    return Finished(entry, found, None if kept is None else _bare(kept), header, capture.sha256, curve)
 
 
 def entry_of(unit: Unit, status: Status, **values: Any) -> Entry:

@@ -142,6 +142,15 @@ def test_a_score_edited_by_hand_is_not_that_of_the_detections(run: Path) -> None
     assert problems(run).count("\n") == 0
 
 
+def test_causes_that_do_not_add_up_to_the_errors_are_found_out(run: Path) -> None:
+    entries = lines(run)
+    row = next(entry for entry in entries if entry["kind"] == "accuracy")["scores"][0]
+    row["causes"] = json.dumps({"misses": {"no candidate": row["fn"] + 1}, "false": {"noise": row["fp"]}})
+    journal(run, entries)
+    sealed(run)
+    assert f"the causes of fn add up to {row['fn'] + 1}, not to {row['fn']}" in problems(run)
+
+
 def test_a_row_of_scores_taken_out_is_missed(run: Path) -> None:
     table = pq.ParquetFile(run / "scores.parquet").read()
     pq.write_table(table.slice(1), run / "scores.parquet")

@@ -35,7 +35,7 @@ from uwbbench.run.folder.identity import (
     unit_name,
 )
 from uwbbench.run.folder.journal import Entry
-from uwbbench.run.folder.scored import column_of, rules_of, score_rows, table_of, with_metrics
+from uwbbench.run.folder.scored import causes_of, column_of, rules_of, score_rows, table_of, with_metrics
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -223,6 +223,8 @@ class _Verifier:
             self._problem(f"journal.jsonl, {_about(entry)}", f"its capture is {header.source}")
         again = score_rows(detections, header, rules)
         self._same(f"journal.jsonl, {_about(entry)}", entry.scores, again)
+        for row in entry.scores:
+            self._causes(f"journal.jsonl, {_about(entry)}", row)
         stored = self.folder.rules
         self.sound[entry.unit] = again if stored == list(rules) else score_rows(detections, header, stored)
         self._count("units scored again")
@@ -289,7 +291,16 @@ class _Verifier:
                     self._problem(where, "no unit gave this row")
                 else:
                     self._same(where, [stored[key]], [expected[key]])
+                    self._causes(where, stored[key])
                 self._count("rows of scores")
+
+    def _causes(self, where: str, row: Mapping[str, Any]) -> None:
+        """Causes against the errors that they explain; those of misses cannot be made again without candidates."""
+        stored = causes_of(row)
+        counts = {} if stored is None else {"fn": stored.misses, "fp": stored.false}
+        for name, parts in counts.items():
+            if sum(parts.values()) != row[name]:
+                self._problem(where, f"the causes of {name} add up to {sum(parts.values())}, not to {row[name]}")
 
     def _stored_metrics(self, table: pd.DataFrame) -> list[str]:
         """Listed metrics that were stored, which version 0.1.0 did not, and are installed."""
