@@ -22,7 +22,7 @@ TIMES = f"datum.label === '' ? '' : format(datum.value, '{PLAIN_NUMBERS}') + 'x'
 LABELLED_PX = 440
 """Width of a plot from which its points have labels; below, they would cover each other, and the legend serves."""
 
-SIDES = ((12, -11), (12, 13), (-12, -11), (-12, 13), (12, -26), (12, 28), (-12, -26), (-12, 28), (12, -41), (12, 43))
+SIDES = ((12, -11), (12, 13), (-12, -11), (-12, 13))
 """Places of a label beside its point, in pixels right and down, the best first."""
 
 

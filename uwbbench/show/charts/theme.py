@@ -54,6 +54,8 @@ def config(*, ink: str, soft: str, line: str, paper: str) -> dict[str, Any]:
             "label": {"color": ink, "fontSize": 11.5},
             "note": {"color": soft, "fontSize": 11},
             "deadline": {"color": soft, "strokeWidth": 1.2},
+            "bound": {"color": ink, "strokeWidth": 2.4, "strokeDash": [7, 4]},
+            "asked": {"color": ink},
             "front": {"color": soft, "strokeWidth": 1.2},
             "halo": {"color": paper, "strokeWidth": 3.2},
             "range": {"color": SERIES[2], "strokeWidth": 1.6},
