@@ -135,6 +135,7 @@ def print_report(report: Report) -> None:
 def print_leaderboard(report: Report) -> None:
     """Print how the detectors did on each dataset, best first, and what did not work."""
     from uwbbench.show.text.quantity import Quantity, undefined_titles
+    from uwbbench.show.text.wording import set_aside_warning
 
     quantities = Quantity.of_all(report.metrics.brief)
     groups: dict[str, list[list[str]]] = {}
@@ -163,6 +164,6 @@ def print_leaderboard(report: Report) -> None:
         typer.echo(f"failed: {entry.kind}: {what}: {entry.reason}", err=True)
     for reason in dict.fromkeys(reason for _, _, reason in report.unscored):
         typer.echo(f"not scored: {reason}", err=True)
-    print_notes(report.notes)
+    print_notes([*map(set_aside_warning, report.set_aside), *report.notes])
     if failed or unscored:
         typer.echo(f"{failed} units failed, {unscored} could not be scored", err=True)

@@ -29,6 +29,7 @@ from uwbbench.measure.accuracy.stats import Estimate
 from uwbbench.results import published
 from uwbbench.results.limits import Limits
 from uwbbench.results.results import Scored, errors_in, estimates_of, scored
+from uwbbench.results.set_aside import SetAside, set_aside
 from uwbbench.run.folder.folder import RunFolder
 from uwbbench.run.folder.journal import Entry
 from uwbbench.run.folder.reported import REPORTED_FACT
@@ -244,6 +245,11 @@ class Report:
         return [{"detector": name} | facts[name] for name in self.detectors if name in facts]
 
     @cached_property
+    def set_aside(self) -> list[SetAside]:
+        """Where a scoring looked at less than half of what a detector found."""
+        return set_aside(self.folder, self._of_kind("accuracy"), self.scored)
+
+    @cached_property
     def failures(self) -> list[Entry]:
         """Units, and whole datasets, that failed."""
         return [entry for entry in self.entries if entry.status == "failed"]
@@ -283,6 +289,7 @@ class Report:
             "latency": [{**facts_of(entry), **entry.facts} for entry in self._of_kind("latency")],
             "captures": self.captures,
             "stability": self.stability,
+            "set_aside": [dataclasses.asdict(one) for one in self.set_aside],
             "failures": [{key: getattr(entry, key) for key in keys} for entry in self.failures],
             "unscored": [{**facts_of(entry), "scoring": s, "reason": reason} for entry, s, reason in self.unscored],
             "notes": self.notes,
