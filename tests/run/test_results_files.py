@@ -130,7 +130,7 @@ def test_reported_times_are_marked_and_kept(make_experiment, mine, tmp_path):
     assert [(one.kind, one.status) for one in folder.entries()] == [("accuracy", "done")]
     np.testing.assert_array_equal(folder.times_us(entry.unit), np.arange(10.0, 55.0))
     assert entry.facts["reported_times"]["p50_us"] == 32
-    assert "| 32 (as reported) |" in markdown(Report(folder))
+    assert "| 32.0 (as reported) |" in markdown(Report(folder))
     assert verify(folder).passed, verify(folder).problems
     entry.facts["reported_times"]["p50_us"] = 1.0
     folder.record(entry)
