@@ -23,6 +23,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from uwbbench.api.errors import StoreError
+from uwbbench.config.detector import from_results, marked
 from uwbbench.measure.accuracy.metrics.choice import MetricChoice
 from uwbbench.measure.accuracy.ranked import RankedCounts
 from uwbbench.measure.accuracy.stats import Estimate
@@ -31,9 +32,11 @@ from uwbbench.results.error_causes import ErrorCauses, error_causes
 from uwbbench.results.limits import Limits
 from uwbbench.results.ranked_curves import RankedCurve, ranked_curve
 from uwbbench.results.results import Scored, errors_in, estimates_of, scored
+from uwbbench.results.set_aside import SetAside, set_aside
 from uwbbench.results.slices import Board
 from uwbbench.run.folder.folder import RunFolder
 from uwbbench.run.folder.journal import Entry
+from uwbbench.run.folder.reported import REPORTED_FACT
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -81,6 +84,7 @@ class Report:
         self.experiment: dict[str, Any] = folder.manifest["experiment"]
         self.entries: list[Entry] = folder.entries()
         self.detectors: list[str] = [config["name"] for config in self.experiment["detectors"]]
+        self.read_only: set[str] = {one["name"] for one in self.experiment["detectors"] if from_results(one)}
         self.metrics = MetricChoice(self.experiment["metrics"])
         self.settings: dict[str, Any] = {**self.experiment["intervals"], "seed": self.experiment["seed"]}
 
@@ -115,13 +119,22 @@ class Report:
             "errors": errors_in(one.outcome for one in members),
             "exhaustive": all(one.outcome.exhaustive for one in members),
             "chance_recall": float((chance * truths).sum() / truths.sum()) if truths.sum() else math.nan,
+            "results_file": first.detector in self.read_only,
             **self._times(first.detector, first.dataset),
         }
 
     def _times(self, detector: str, dataset: str) -> dict[str, Any]:
-        """Times of a detector: medians over the captures that were timed."""
-        timed = [e.facts for e in self._of_kind("latency") if (e.detector, e.dataset) == (detector, dataset)]
+        """Times of a detector: medians over the captures that were timed, or as its results files report them."""
+        if detector in self.read_only:
+            mine = [e.facts for e in self._of_kind("accuracy") if (e.detector, e.dataset) == (detector, dataset)]
+            timed = [facts[REPORTED_FACT] for facts in mine if REPORTED_FACT in facts]
+        else:
+            timed = [e.facts for e in self._of_kind("latency") if (e.detector, e.dataset) == (detector, dataset)]
         return {key: _median(facts[key] for facts in timed) for key in ("p50_us", "p99_us")}
+
+    def label(self, detector: str, text: str | None = None) -> str:
+        """Name of a detector, or another text for it, as tables show it: marked where its results were read."""
+        return marked(text or detector, results_file=detector in self.read_only)
 
     def _of_kind(self, kind: str) -> list[Entry]:
         return [entry for entry in self.entries if entry.kind == kind and entry.status == "done"]
@@ -258,6 +271,11 @@ class Report:
         return [{"detector": name} | facts[name] for name in self.detectors if name in facts]
 
     @cached_property
+    def set_aside(self) -> list[SetAside]:
+        """Where a scoring looked at less than half of what a detector found."""
+        return set_aside(self.folder, self._of_kind("accuracy"), self.scored)
+
+    @cached_property
     def failures(self) -> list[Entry]:
         """Units, and whole datasets, that failed."""
         return [entry for entry in self.entries if entry.status == "failed"]
@@ -302,6 +320,7 @@ class Report:
             "latency": [{**facts_of(entry), **entry.facts} for entry in self._of_kind("latency")],
             "captures": self.captures,
             "stability": self.stability,
+            "set_aside": [dataclasses.asdict(one) for one in self.set_aside],
             "failures": [{key: getattr(entry, key) for key in keys} for entry in self.failures],
             "unscored": [{**facts_of(entry), "scoring": s, "reason": reason} for entry, s, reason in self.unscored],
             "notes": self.notes,

@@ -9,6 +9,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from uwbbench.api.errors import ConfigError, nearest
+from uwbbench.api.text import printable
+from uwbbench.config.detector import from_results, marked
 from uwbbench.measure.accuracy.metrics.choice import MetricChoice, combined
 from uwbbench.results.comparison.changes import Change, changes
 from uwbbench.results.comparison.flips import Flip, flips
@@ -18,6 +20,7 @@ from uwbbench.results.report import read_safely
 from uwbbench.run.folder.folder import RunFolder
 
 MOST_FLIPS = 20
+LONGEST_NAME = 60
 
 
 @dataclass(frozen=True)
@@ -66,6 +69,12 @@ class Comparison:
         """Whether anything differs but measured times and the machine, which never repeat."""
         inputs = any(change.kind != "machine" for change in self.changes)
         return inputs or bool(self.changed_scores) or any(self.flip_counts.values()) or self._unequal
+
+    def label(self, detector: str) -> str:
+        """Name of a detector as tables show it, which say so where either run read its results from files."""
+        configs = [one for folder in (self.first, self.second) for one in folder.manifest["experiment"]["detectors"]]
+        read = any(one["name"] == detector and from_results(one) for one in configs)
+        return marked(printable(detector, LONGEST_NAME), results_file=read)
 
     @property
     def _unequal(self) -> bool:

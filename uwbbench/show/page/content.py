@@ -15,16 +15,18 @@ from uwbbench.results.cases import Case, cases
 from uwbbench.results.pareto import Speed, speeds_of_run
 from uwbbench.results.report import Report
 from uwbbench.results.results import Scored
+from uwbbench.results.set_aside import SetAside
 from uwbbench.results.slices import Board, Slice, cuts, range_edges_m, slices, span_name
 from uwbbench.show.charts import time_chart
 from uwbbench.show.charts.chart import Spec
+from uwbbench.show.looks import Look, looks
 from uwbbench.show.page.board_charts import BOARD_CHARTS, drawn
-from uwbbench.show.page.looks import look
+from uwbbench.show.page.captures import look
 from uwbbench.show.page.timed import COLUMNS, timed_cells
 from uwbbench.show.text.numbers import rounded
 from uwbbench.show.text.quantity import Quantity
 from uwbbench.show.text.sheet import labels
-from uwbbench.show.text.wording import TABLES
+from uwbbench.show.text.wording import TABLES, set_aside_warning
 
 
 class Content:
@@ -39,7 +41,7 @@ class Content:
 
     def __init__(self, report: Report, roots: Sequence[Path] | None = None) -> None:
         self.report, self.roots = report, roots
-        self.detectors = labels(report.detectors)
+        self.detectors = {name: report.label(name, short) for name, short in labels(report.detectors).items()}
         self.datasets = labels(used["label"] for used in report.experiment["datasets"])
         self.quantities = Quantity.of_all(report.metrics)
         self.scored = [one for one in report.scored if one.dataset not in report.limits.datasets]
@@ -88,6 +90,11 @@ class Content:
             if about["table"] == "filtering" and (about["scoring"] == first or first not in scorings):
                 leaders.setdefault((about["dataset"], about["source"]), about["detector"])
         return leaders
+
+    @cached_property
+    def marks(self) -> dict[str, Look]:
+        """Look of each detector by its label."""
+        return looks(self.detectors.values())
 
     # Charts ----------------------------------------------------------------------------------------------------
 
@@ -172,6 +179,7 @@ class Content:
         ]
         return {
             "detectors": list(self.detectors.values()),
+            "marks": [[one.path, one.colour] for one in self.marks.values()],
             "quantities": [vars(quantity) for quantity in self.quantities.values()],
             "boards": [self._board(board, materials) for board in boards],
             "spans": self.spans,
@@ -200,7 +208,7 @@ class Content:
             "cuts": same,
             "charted": self.charted(board),
             "missing": self._missing(board),
-            "warnings": [],
+            "warnings": [set_aside_warning(one) for one in self.report.set_aside if _of_board(one, board)],
             "timing": list(self.datasets).index(dataset),
         }
 
@@ -219,6 +227,10 @@ class Content:
                 why = "it does not cluster positions" if board[3] == "mapping" else "it could not be scored"
                 said.append(f"{label}: not here, as {why}.")
         return said
+
+
+def _of_board(one: SetAside, board: Board) -> bool:
+    return (one.dataset, one.source, one.scoring, "filtering") == board
 
 
 def _packed(estimate: Any) -> list[Any]:

@@ -2,7 +2,7 @@
   const read = (id) => JSON.parse(document.getElementById(id).textContent);
   const data = read("data"), config = read("theme-config");
   const at = (id) => document.getElementById(id);
-  const { root, make, sortBy, sortable } = base;
+  const { root, make, sortBy, sortable, markOf } = base;
 
   function fill(select, options, keep) {
     select.replaceChildren(...options.map(([value, text]) => make("option", text, { value })));
@@ -23,6 +23,11 @@
     }
     return lines;
   }
+  function fitLegends(part, columns) {
+    if (part === null || typeof part !== "object") return;
+    if (part.legend?.columns) part.legend.columns = columns;
+    for (const value of Object.values(part)) if (!Array.isArray(value) || value.length < 40) fitLegends(value, columns);
+  }
   async function draw(place, spec, why) {
     views.get(place)?.finalize();
     views.delete(place);
@@ -37,6 +42,7 @@
     }
     fitted.title.text = wrapped(head.text, letters);
     fitted.title.subtitle = wrapped(head.subtitle ?? "", letters * 1.12);
+    fitLegends(fitted, Math.max(2, Math.floor(place.clientWidth / 170)));
     const made = await vegaEmbed(place, fitted, options);
     views.set(place, { ...made, finalize: made.finalize, source: spec });
     const picture = place.querySelector("svg");
@@ -128,7 +134,9 @@
       });
       for (const row of rows) {
         const tr = make("tr"), values = row[7];
-        tr.append(make("th", data.detectors[row[4]], { scope: "row" }));
+        const who = make("th", undefined, { scope: "row" });
+        who.append(markOf(data.marks[row[4]]), data.detectors[row[4]]);
+        tr.append(who);
         const scored = columns.map(({ one, index }, place) => {
           const [value, low, high, n, groups] = values[index];
           const title = value === null ? "undefined here: nothing was retained, nothing was to be found, or too few samples" : `n = ${n} ${one.samples}, ${groups} groups`;

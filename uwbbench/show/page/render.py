@@ -7,7 +7,7 @@ Expressions of charts are interpreted, not compiled, as the page's policy asks.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -18,11 +18,12 @@ from uwbbench.show.charts import scene_charts
 from uwbbench.show.charts.chart import Spec
 from uwbbench.show.charts.theme import PAGE, PRINT
 from uwbbench.show.extras import report_tools
+from uwbbench.show.html.cell import Table, table_of
 from uwbbench.show.html.render import badge, document, embedded
 from uwbbench.show.page.content import Content
 from uwbbench.show.page.sections import sections
 from uwbbench.show.text.formats import INDEX, MARK
-from uwbbench.show.text.sheet import sentence, shown
+from uwbbench.show.text.sheet import Sheet, sentence, shown
 
 FIGURE_WIDTH = 620
 
@@ -49,7 +50,7 @@ def page(content: Content) -> str:
         name=name,
         simulated="simulated" in sources,
         lead=sentence(report.experiment["description"]),
-        sections=parts,
+        sections=[(part, _tables(content, part.sheets), _tables(content, part.folded)) for part in parts],
         looks=content.looks,
         facts=_facts(session, report.experiment),
         manifest=json.dumps(manifest, indent=2, ensure_ascii=False),
@@ -57,6 +58,10 @@ def page(content: Content) -> str:
         data=embedded({**content.data(), "fixed": {part.id: part.charts for part in parts if part.charts}}),
         config=embedded(PAGE),
     )
+
+
+def _tables(content: Content, sheets: Sequence[Sheet]) -> list[Table]:
+    return [table_of(sheet, content.marks) for sheet in sheets]
 
 
 @dataclass(frozen=True)

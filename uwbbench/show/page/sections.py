@@ -10,10 +10,12 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from uwbbench.measure.accuracy.stats import MINIMUM_GROUPS
-from uwbbench.show.page import answer
+from uwbbench.show.page import answer, limits_section
+from uwbbench.show.page.limits_section import limits
 from uwbbench.show.page.section import Section
 from uwbbench.show.text.report import Tables
 from uwbbench.show.text.sheet import sentence, shown
+from uwbbench.show.text.wording import set_aside_warning
 
 if TYPE_CHECKING:
     from uwbbench.show.page.content import Content
@@ -28,15 +30,12 @@ def sections(content: Content) -> list[Section]:
 
 def summary(content: Content) -> Section:
     """What the run says in a sentence for each dataset, and how much it is made of."""
-    said = list(answer.sentences(content))
-    none = () if said or content.report.limits.trials else ("Nothing could be scored; the reasons are under Failed.",)
-    return Section("summary", "Summary", sentences=tuple(said), warnings=none, notes=(_counts(content),))
-
-
-def limits(content: Content) -> Section | None:
-    """Detectors against physical limits."""
-    sheets = tuple(Tables(content.report).limits())
-    return Section("limits", "Physical limits", sheets=sheets) if sheets else None
+    report = content.report
+    said = [*limits_section.sentences(content), *answer.sentences(content)]
+    none = () if said else ("Nothing could be scored; the reasons are under Failed.",)
+    flattered = (one for one in report.set_aside if content.leaders.get((one.dataset, one.source)) == one.detector)
+    warnings = (*none, *map(set_aside_warning, flattered))
+    return Section("summary", "Summary", sentences=tuple(said), warnings=warnings, notes=(_counts(content),))
 
 
 def paper_first(content: Content) -> Section | None:
@@ -107,8 +106,9 @@ def stability(content: Content) -> Section | None:
 
 def compared(content: Content) -> Section | None:
     """What was compared on."""
-    sheets = tuple(Tables(content.report).captures())
-    return Section("compared", "What was compared", sheets=sheets) if sheets else None
+    tables = Tables(content.report)
+    sheets, each = tuple(tables.captures()), tuple(tables.each_capture())
+    return Section("compared", "What was compared", sheets=sheets, folded=each) if sheets else None
 
 
 def failed(content: Content) -> Section | None:

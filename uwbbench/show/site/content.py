@@ -14,6 +14,7 @@ from uwbbench.results.leaderboard.ranking import Pair, Ranking, Standing, rankin
 from uwbbench.results.leaderboard.runs import Run
 from uwbbench.results.leaderboard.suites import Suite
 from uwbbench.results.results import errors_in
+from uwbbench.show.html.cell import Cell, Table
 from uwbbench.show.site import charts
 from uwbbench.show.site.names import Names
 from uwbbench.show.text.numbers import between, interval, number, p_value
@@ -28,40 +29,6 @@ VERDICTS = {
     "too few groups": "too few groups to decide",
     "undefined": "undefined: one of them found nothing",
 }
-
-
-@dataclass(frozen=True)
-class Cell:
-    """One cell of a table.
-
-    Attributes
-    ----------
-    text : str
-    small : str
-        Second line: the interval.
-    key : str
-        What the cell is sorted by; the text if empty.
-    title : str
-        More about it.
-    link : str
-        Address, seen from the root of the site.
-    """
-
-    text: str
-    small: str = ""
-    key: str = ""
-    title: str = ""
-    link: str = ""
-
-
-@dataclass(frozen=True)
-class Table:
-    """A table of cells with what a reader must know."""
-
-    title: str
-    columns: tuple[str, ...]
-    rows: tuple[tuple[Cell, ...], ...]
-    notes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

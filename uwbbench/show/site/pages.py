@@ -10,13 +10,12 @@ from typing import Any
 from uwbbench.measure.accuracy.stats import MINIMUM_GROUPS
 from uwbbench.results.leaderboard.ranking import SETTINGS, SIGNIFICANCE, speeds_by_machine
 from uwbbench.results.leaderboard.suites import Contender, Suite
+from uwbbench.show.html.cell import Cell, Table
 from uwbbench.show.html.render import badge
 from uwbbench.show.site.content import (
     VERDICTS,
-    Cell,
     Content,
     Section,
-    Table,
     metric_cell,
     pair_cell,
     quantity,
