@@ -26,6 +26,9 @@ from uwbbench.measure.accuracy.ranked import RankedCounts, pooled
 
 MOST_POINTS = 150
 
+CurveKey = tuple[str, str, str]
+"""Dataset, source and detector."""
+
 
 @dataclass(frozen=True)
 class RankedCurve:
@@ -56,6 +59,13 @@ class RankedCurve:
     false_alarms_per_minute: Interval
     setting: dict[str, Interval]
     exhaustive: bool
+
+    def recall_at(self, rate: float) -> float:
+        """Largest recall at no more than so many false alarms a minute; NaN where these are undefined."""
+        if not self.exhaustive:
+            return math.nan
+        reached = self.recall.value[self.false_alarms_per_minute.value <= rate]
+        return float(np.max(reached, initial=0.0))
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values; undefined ones are NaN."""

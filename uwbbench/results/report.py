@@ -30,7 +30,7 @@ from uwbbench.measure.accuracy.stats import Estimate
 from uwbbench.results import published
 from uwbbench.results.error_causes import ErrorCauses, error_causes
 from uwbbench.results.limits import Limits
-from uwbbench.results.ranked_curves import RankedCurve, ranked_curve
+from uwbbench.results.ranked_curves import CurveKey, RankedCurve, ranked_curve
 from uwbbench.results.results import Scored, errors_in, estimates_of, scored
 from uwbbench.results.set_aside import SetAside, set_aside
 from uwbbench.results.slices import Board
@@ -164,12 +164,12 @@ class Report:
         return sorted(error_causes(self.scored), key=lambda one: order[(*one.board, one.detector)])
 
     @cached_property
-    def curves(self) -> dict[tuple[str, str, str], RankedCurve]:
+    def curves(self) -> dict[CurveKey, RankedCurve]:
         """What each detector would find at every threshold, by dataset, source and detector.
 
         Those are left out whose candidates are not known under the rules of the scores.
         """
-        groups: dict[tuple[str, str, str], list[RankedCounts]] = defaultdict(list)
+        groups: dict[CurveKey, list[RankedCounts]] = defaultdict(list)
         scored = {(one.detector, one.dataset, one.capture) for one in self.scored}
         for entry in self._of_kind("accuracy"):
             if (entry.detector, entry.dataset, entry.capture) in scored:
