@@ -20,7 +20,7 @@ from uwbbench.config.detector import DetectorConfig, read_detector
 from uwbbench.config.extends import extended, placed
 from uwbbench.config.given import Given, read_given
 from uwbbench.config.model import ConfigModel, DetectorName
-from uwbbench.config.rules import GateRadius, IntervalModel, RegionModel, Scoring, Strongest
+from uwbbench.config.rules import GateRadius, IntervalModel, MetricsUse, RegionModel, Scoring, Strongest
 from uwbbench.config.source import data_roots
 from uwbbench.measure.latency.settings import LatencyModel
 
@@ -74,9 +74,10 @@ class ExperimentModel(ConfigModel):
     gate_m: GateRadius
     region: RegionModel = Field(default_factory=RegionModel)
     strongest: Strongest
-    metrics: list[str] = Field(
+    metrics: MetricsUse = Field(
         default_factory=list,
-        description="Registered metrics to show besides the default ones; the first ranks, if it has a better end.",
+        description="Registered metrics to show besides the default ones, of which the first ranks, if it has a better "
+        "end; or exactly which metrics rank, are columns of tables, and are charted.",
     )
     latency: LatencyModel = Field(default_factory=LatencyModel)
     stability: bool = Field(default=True, description="Put the hard cases to each detector; see 'uwbbench stability'.")
@@ -113,7 +114,8 @@ class Experiment:
     gate_m : float
     region : RegionModel
     strongest : int or None
-    metrics : tuple of str
+    metrics : tuple of str or mapping
+        As the file has it: metrics besides the default ones, or exactly which of them are shown where.
     latency : LatencyModel
     stability : bool
     seed : int
@@ -128,7 +130,7 @@ class Experiment:
     gate_m: float
     region: RegionModel
     strongest: int | None
-    metrics: tuple[str, ...]
+    metrics: tuple[str, ...] | Mapping[str, Any]
     latency: LatencyModel
     stability: bool
     seed: int
@@ -152,7 +154,7 @@ class Experiment:
             "gate_m": self.gate_m,
             "region": self.region.model_dump(),
             "strongest": self.strongest,
-            "metrics": list(self.metrics),
+            "metrics": dict(self.metrics) if isinstance(self.metrics, Mapping) else list(self.metrics),
             "latency": self.latency.model_dump(),
             "stability": self.stability,
             "seed": self.seed,
@@ -188,9 +190,7 @@ def read_experiment(name: Given, changes: Mapping[str, Any] | None = None, data_
     model = checked(ExperimentModel, data, source)
     if model.set:
         raise ConfigError(f"{source.place(('set',))}: 'set' changes an extended experiment, but 'extends' is missing")
-    for index, metric in enumerate(model.metrics):
-        with placed(source, ("metrics", index)):
-            registry.load_plugin("metrics", metric)
+    metrics = _metrics(model, source)
     if model.latency.enabled and model.latency.reference is not None:
         with placed(source, ("latency", "reference")):
             read_detector(model.latency.reference, path.parent)
@@ -203,12 +203,31 @@ def read_experiment(name: Given, changes: Mapping[str, Any] | None = None, data_
         gate_m=model.gate_m,
         region=model.region,
         strongest=model.strongest,
-        metrics=tuple(dict.fromkeys(model.metrics)),
+        metrics=metrics,
         latency=model.latency,
         stability=model.stability,
         seed=model.seed,
         intervals=model.intervals,
     )
+
+
+def _metrics(model: ExperimentModel, source: YamlFile) -> tuple[str, ...] | dict[str, Any]:
+    """Metrics as the experiment has them, each looked up."""
+    if isinstance(model.metrics, list):
+        places: list[tuple[str, tuple[str | int, ...]]] = [(name, (at,)) for at, name in enumerate(model.metrics)]
+    else:
+        chosen = model.metrics
+        places = [(chosen.rank, ("rank",))] if chosen.rank is not None else []
+        places += [(name, ("table", at)) for at, name in enumerate(chosen.table or ())]
+        places += [(name, ("charts", at)) for at, name in enumerate(chosen.charts or ())]
+    for name, at in places:
+        with placed(source, ("metrics", *at)):
+            metric = registry.load_plugin("metrics", name)
+            if at == ("rank",) and metric.better == "zero":
+                raise ConfigError(f"metric '{name}' has no better end, so it cannot rank")
+    if isinstance(model.metrics, list):
+        return tuple(dict.fromkeys(model.metrics))
+    return model.metrics.model_dump(exclude_none=True)
 
 
 def _with_absolute_paths(values: dict[str, Any], folder: Path) -> dict[str, Any]:

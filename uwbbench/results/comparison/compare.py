@@ -11,7 +11,7 @@ from typing import Any
 from uwbbench.api.errors import ConfigError, nearest
 from uwbbench.api.text import printable
 from uwbbench.config.detector import from_results, marked
-from uwbbench.measure.accuracy.metrics.choice import MetricChoice
+from uwbbench.measure.accuracy.metrics.choice import MetricChoice, combined
 from uwbbench.results.comparison.changes import Change, changes
 from uwbbench.results.comparison.flips import Flip, flips
 from uwbbench.results.comparison.scores import ScoreChange, TimeChange, score_changes, time_changes
@@ -132,9 +132,7 @@ def compare(first: RunFolder, second: RunFolder, scoring: str | None = None, mos
     with read_safely(first.path):
         rules = {rule.scoring: rule for rule in first.rules}
         settings = {**first.manifest["experiment"]["intervals"], "seed": first.manifest["experiment"]["seed"]}
-        metrics = MetricChoice(
-            [name for folder in (first, second) for name in folder.manifest["experiment"]["metrics"]]
-        )
+        metrics = combined([folder.manifest["experiment"]["metrics"] for folder in (first, second)])
     if scoring is not None and scoring not in rules:
         raise ConfigError(f"{first.path}: was not scored by '{scoring}'.{nearest(scoring, rules)}")
     rule = next(rule for name, rule in rules.items() if scoring in (None, name))

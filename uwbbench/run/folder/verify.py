@@ -23,7 +23,7 @@ import numpy as np
 from uwbbench.api.errors import UwbbenchError
 from uwbbench.api.text import one_line, printable
 from uwbbench.config.detector import RESULTS, detector_identity, from_results
-from uwbbench.measure.accuracy.metrics.choice import MetricChoice
+from uwbbench.measure.accuracy.metrics.choice import MetricChoice, names_of
 from uwbbench.run.folder.folder import RunFolder
 from uwbbench.run.folder.identity import (
     accuracy_identity,
@@ -318,7 +318,7 @@ class _Verifier:
 
     def _stored_metrics(self, table: pd.DataFrame) -> list[str]:
         """Listed metrics that were stored, which version 0.1.0 did not, and are installed."""
-        listed: list[str] = self.manifest["experiment"]["metrics"]
+        listed = names_of(self.manifest["experiment"]["metrics"])
         metrics = MetricChoice(listed)
         self.notes += [
             f"metric {_shown(name)} is not installed: its values were not checked" for name in metrics.absent

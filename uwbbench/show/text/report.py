@@ -11,6 +11,7 @@ from uwbbench.measure.accuracy.metrics.choice import MetricChoice
 from uwbbench.measure.accuracy.stats import MINIMUM_GROUPS
 from uwbbench.results.report import Report
 from uwbbench.show.text.captures_sheets import captures_sheet, each_capture_sheet
+from uwbbench.show.text.error_sheets import cause_sheets, curve_sheets, main_causes
 from uwbbench.show.text.limits_sheets import limits_sheets
 from uwbbench.show.text.numbers import interval, number, time_us
 from uwbbench.show.text.paper_sheets import paper_sheets
@@ -25,6 +26,8 @@ def sheets(report: Report) -> list[Sheet]:
     parts = (
         tables.limits,
         tables.leaderboards,
+        tables.causes,
+        tables.curves,
         tables.paper,
         tables.latency,
         tables.stability,
@@ -48,6 +51,18 @@ class Tables:
     def leaderboards(self) -> Iterator[Sheet]:
         """One for each dataset, scoring and table."""
         return self._labelled(_leaderboards(self._report))
+
+    def causes(self) -> Iterator[Sheet]:
+        """What each cause of errors costs, on one board of each dataset."""
+        known = [one for one in self._report.causes if one.board[0] not in self._report.limits.datasets]
+        return self._labelled(cause_sheets(main_causes(known)))
+
+    def curves(self) -> Iterator[Sheet]:
+        """Detectors without their thresholds."""
+        every = self._report.curves
+        return self._labelled(
+            curve_sheets({k: v for k, v in every.items() if k[0] not in self._report.limits.datasets})
+        )
 
     def paper(self) -> Iterator[Sheet]:
         """The two tables of arXiv 2512.01018."""
