@@ -48,6 +48,7 @@ def page(content: Content) -> str:
         lead=sentence(report.experiment["description"]),
         sections=_sections(content, tables),
         summary=content.summary(),
+        published=list(Tables(report).published()),
         counts=_counts(content),
         boards=bool(content.boards),
         confidence=f"{report.experiment['intervals']['confidence']:.0%}",
@@ -125,6 +126,8 @@ def _tables(tables: Tables) -> list[tuple[str, str, list[Any], str]]:
 
 def _sections(content: Content, tables: list[tuple[str, str, list[Any], str]]) -> list[tuple[str, str]]:
     sections = [("summary", "Summary")]
+    if content.report.published:
+        sections.append(("published", "Published and here"))
     if content.boards:
         sections += [("leaderboard", "Leaderboard"), ("pareto", "Speed against error")]
         sections += [("range", "By distance"), ("errors", "Errors")]
