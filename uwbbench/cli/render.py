@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from uwbbench.show.text.numbers import number
+from uwbbench.show.text.numbers import number, time_us
 
 if TYPE_CHECKING:
     from uwbbench.api.metric import Metric
@@ -63,8 +63,11 @@ def print_notes(notes: Sequence[str]) -> None:
 
 def print_scores(result: Mapping[str, Any]) -> None:
     """Print what ``score --json`` prints, for people: the two tables as columns, and the times."""
+    from uwbbench.config.detector import marked
+
     label = "SIMULATED capture" if result["source"] == "simulated" else "capture"
-    typer.echo(f"{result['detector']} on {label} '{result['capture']}', {result['frames']} frames")
+    name = marked(result["detector"], results_file=result["results_file"] is not None)
+    typer.echo(f"{name} on {label} '{result['capture']}', {result['frames']} frames")
     tables = [name for name in ("filtering", "mapping") if result[name] is not None]
     rows = [[title, *cells] for title, cells in _scores([result[name] for name in tables])]
     title = f"scoring '{result['scoring']}', gate {result['gate_m']:g} m"
@@ -73,8 +76,11 @@ def print_scores(result: Mapping[str, Any]) -> None:
         typer.echo("after mapping: n/a (the detector does not cluster positions)")
     times = result["latency_us"]
     if times is not None:
-        shown = [f"{key} {number(times[key], 1, 1.0, 'us', 'too few calls')}" for key in _TIMES]
-        typer.echo(f"time a frame, one frame a call ({times['n']} calls): {', '.join(shown)}")
+        shown = [f"{key} {number(times[key], 1, 1.0, 'us', 'too few calls')}" for key in _TIMES if key in times]
+        how = f"as the file reports it ({times['n']} frames)"
+        if not times.get("as_reported"):
+            how = f"one frame a call ({times['n']} calls)"
+        typer.echo(f"time a frame, {how}: {', '.join(shown)}")
     print_notes(result["notes"])
 
 
@@ -139,8 +145,9 @@ def print_leaderboard(report: Report) -> None:
         if not about["exhaustive"]:
             open_world.add(title)
         numbers = [number(estimates[name].value, by.digits, by.factor) for name, by in quantities.items()]
-        others = [number(about["p50_us"], 0), number(about["chance_recall"], 3)]
-        groups.setdefault(title, []).append([about["scoring"], about["table"], about["detector"], *numbers, *others])
+        others = [time_us(about, "p50_us"), number(about["chance_recall"], 3)]
+        label = report.label(about["detector"])
+        groups.setdefault(title, []).append([about["scoring"], about["table"], label, *numbers, *others])
     heads = [by.axis for by in quantities.values()]
     columns = ["scoring", "after", "detector", *heads, "p50 (us)", "chance recall"]
     for title, rows in groups.items():

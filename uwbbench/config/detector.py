@@ -111,6 +111,9 @@ class DetectorConfig:
     steps : tuple of Step
     score : str
         Column that orders candidates in curves without a threshold; empty where the file names none.
+    results : Path or None
+        Folder in which another program has stored what it found; there are no steps then, and ``fidelity`` says so.
+        What is in it counts, not where it is: it is no part of the resolved file.
     """
 
     name: str
@@ -119,6 +122,12 @@ class DetectorConfig:
     citation: str = ""
     fidelity: str = "baseline"
     score: str = ""
+    results: Path | None = field(default=None, compare=False)
+
+    @classmethod
+    def of_results(cls, name: str, folder: Path) -> DetectorConfig:
+        """Detector that is known by what it has written alone."""
+        return cls(name, (), fidelity=RESULTS_FILE, results=folder)
 
     def to_dict(self) -> dict[str, Any]:
         """Resolved file as plain values: what a manifest stores and an identity is made of."""
@@ -130,6 +139,22 @@ class DetectorConfig:
 KERNEL = "kernel "
 """What the names of kernels begin with among the names of sources."""
 
+RESULTS_FILE = "results file"
+"""Fidelity of a detector that is known by what it has written alone, and how tables mark its rows."""
+
+RESULTS = "results of "
+"""What the names of such detectors begin with among the names of sources."""
+
+
+def from_results(config: Mapping[str, Any]) -> bool:
+    """Whether a resolved detector is known by what it has written alone."""
+    return bool(config.get("fidelity") == RESULTS_FILE)
+
+
+def marked(name: str, *, results_file: bool) -> str:
+    """Name of a detector as tables show it, which say so where its rows are read from a file."""
+    return f"{name} ({RESULTS_FILE})" if results_file else name
+
 
 def detector_identity(config: Mapping[str, Any], sources: Mapping[str, str]) -> str:
     """SHA-256 over a resolved detector and the sources of its stages.
@@ -140,10 +165,15 @@ def detector_identity(config: Mapping[str, Any], sources: Mapping[str, str]) -> 
         As :meth:`DetectorConfig.to_dict` gives it.
     sources : mapping of str to str
         SHA-256 of the sources of each stage by its name, and of each kernel, which may stand for some, by its name
-        behind ``KERNEL``. Those of other stages do not count.
+        behind ``KERNEL``. Those of other stages do not count. For a detector that is known by what it has written
+        alone: SHA-256 of that by its name behind ``RESULTS``, and nothing else.
     """
-    used = {step["use"]: sources[step["use"]] for step in config["pipeline"]}
-    used |= {name: sha256 for name, sha256 in sources.items() if name.startswith(KERNEL)}
+    if from_results(config):
+        name = f"{RESULTS}{config['name']}"
+        used = {name: sources[name]}
+    else:
+        used = {step["use"]: sources[step["use"]] for step in config["pipeline"]}
+        used |= {name: sha256 for name, sha256 in sources.items() if name.startswith(KERNEL)}
     text = json.dumps({"detector": config, "sources": used}, sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()
 

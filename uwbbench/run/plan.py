@@ -86,7 +86,7 @@ def plan(experiment: Experiment) -> Plan:
             continue
         accuracy += [Unit("accuracy", d, source.label, ref) for ref in references for d in experiment.detectors]
         timed = references if experiment.latency.captures == "all" else references[:1]
-        latency += [Unit("latency", d, source.label, ref) for ref in timed for d in experiment.detectors]
+        latency += [Unit("latency", d, source.label, ref) for ref in timed for d in experiment.runnable]
     return Plan(tuple(accuracy + (latency if experiment.latency.enabled else [])), tuple(failures))
 
 

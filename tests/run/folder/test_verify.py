@@ -21,7 +21,7 @@ from uwbbench.run.folder.verify import verify
 EXPERIMENT = """\
 schema: 1
 name: small
-detectors: [cfar-os, paper-filtering]
+detectors: [oracle, paper-filtering]
 datasets:
   - {use: approach, params: {speed_m_s: 3.0, runs: 2}}
 scoring: [frame, object]
@@ -127,7 +127,7 @@ def test_another_machine_does_not_fit_the_times_even_with_a_new_seal(run: Path) 
     sessions[0]["machine"]["cpu"] = "a better one"
     manifest(run, sessions=sessions)
     sealed(run)
-    assert "latency cfar-os" in problems(run)
+    assert "latency oracle" in problems(run)
     assert "its identity is not that of its detector, capture, rules and machine" in problems(run)
 
 

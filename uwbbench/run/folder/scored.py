@@ -15,7 +15,7 @@ from uwbbench.api.metric import Metric, Outcome
 from uwbbench.config.rules import RegionModel
 from uwbbench.measure.accuracy.causes import Causes, causes
 from uwbbench.measure.accuracy.judge import Scene
-from uwbbench.measure.accuracy.metrics.choice import MetricChoice
+from uwbbench.measure.accuracy.metrics.choice import MetricChoice, Metrics, names_of
 from uwbbench.measure.accuracy.scoring import Region, ScoringRules, outcomes, score
 from uwbbench.measure.accuracy.stats import evaluate
 from uwbbench.run.folder.folder import RunFolder
@@ -100,7 +100,7 @@ def with_metrics(
     folder: RunFolder,
     rows_of: Mapping[str, list[dict[str, Any]]],
     rules: Sequence[ScoringRules],
-    listed: Sequence[str],
+    chosen: Metrics,
 ) -> dict[str, list[dict[str, Any]]]:
     """Rows with values of the metrics that an experiment lists, where these are installed.
 
@@ -112,7 +112,8 @@ def with_metrics(
         Rows of units that were done, of :func:`score_rows`.
     rules : sequence of ScoringRules
         That gave the rows.
-    listed : sequence of str
+    chosen : sequence or mapping
+        As the experiment has them.
 
     Raises
     ------
@@ -121,7 +122,7 @@ def with_metrics(
     StoreError
         If stored detections are missing or broken.
     """
-    metrics = MetricChoice(listed)
+    metrics, listed = MetricChoice(chosen), names_of(chosen)
     columns = {name: column_of(name, metrics[name].unit) for name in listed if name not in metrics.absent}
     completed = {unit: list(rows) for unit, rows in rows_of.items()}
     for entry in folder.entries() if columns else ():

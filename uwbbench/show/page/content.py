@@ -41,7 +41,7 @@ class Content:
 
     def __init__(self, report: Report, roots: Sequence[Path] | None = None) -> None:
         self.report, self.roots = report, roots
-        self.detectors = labels(report.detectors)
+        self.detectors = {name: report.label(name, short) for name, short in labels(report.detectors).items()}
         self.datasets = labels(used["label"] for used in report.experiment["datasets"])
         self.quantities = Quantity.of_all(report.metrics)
         self.scored = [one for one in report.scored if one.dataset not in report.limits.datasets]

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from uwbbench.measure.accuracy.stats import MINIMUM_GROUPS
-from uwbbench.show.page import answer, limits_section
+from uwbbench.show.page import answer, error_sections, limits_section
 from uwbbench.show.page.limits_section import limits
 from uwbbench.show.page.section import Section
 from uwbbench.show.text.report import Tables
@@ -136,6 +136,8 @@ SECTIONS: tuple[Writer, ...] = (
     pareto,
     by_range,
     errors,
+    error_sections.causes,
+    error_sections.curves,
     looks,
     latency,
     paper_later,

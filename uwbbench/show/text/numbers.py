@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
+from typing import Any
 
 UNDEFINED = "n/a"
 
@@ -50,6 +52,18 @@ def interval(value: object, low: object, high: object, digits: int, scale: float
     """
     text, ends = number(value, digits, scale), between(low, high, digits, scale)
     return f"{text} {ends}" if ends and text != UNDEFINED else text
+
+
+def time_us(row: Mapping[str, Any], key: str) -> str:
+    """Microseconds of a leaderboard's row; of a results file they are as reported, not measured here.
+
+    Examples
+    --------
+    >>> time_us({"p50_us": 41.7, "results_file": True}, "p50_us")
+    '41.7 (as reported)'
+    """
+    text = significant(row[key], 3)
+    return f"{text} (as reported)" if row["results_file"] and text != UNDEFINED else text
 
 
 def between(low: object, high: object, digits: int, scale: float = 1.0) -> str:

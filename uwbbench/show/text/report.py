@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -11,8 +11,9 @@ from uwbbench.measure.accuracy.metrics.choice import MetricChoice
 from uwbbench.measure.accuracy.stats import MINIMUM_GROUPS
 from uwbbench.results.report import Report
 from uwbbench.show.text.captures_sheets import captures_sheet, each_capture_sheet
+from uwbbench.show.text.error_sheets import cause_sheets, curve_sheets, main_causes
 from uwbbench.show.text.limits_sheets import limits_sheets
-from uwbbench.show.text.numbers import interval, number, significant
+from uwbbench.show.text.numbers import interval, number, time_us
 from uwbbench.show.text.paper_sheets import paper_sheets
 from uwbbench.show.text.quantity import Quantity, undefined_titles
 from uwbbench.show.text.sheet import Sheet, escaped, sentence, shown
@@ -25,6 +26,8 @@ def sheets(report: Report) -> list[Sheet]:
     parts = (
         tables.limits,
         tables.leaderboards,
+        tables.causes,
+        tables.curves,
         tables.paper,
         tables.latency,
         tables.stability,
@@ -47,15 +50,27 @@ class Tables:
 
     def leaderboards(self) -> Iterator[Sheet]:
         """One for each dataset, scoring and table."""
-        return _leaderboards(self._report)
+        return self._labelled(_leaderboards(self._report))
+
+    def causes(self) -> Iterator[Sheet]:
+        """What each cause of errors costs, on one board of each dataset."""
+        known = [one for one in self._report.causes if one.board[0] not in self._report.limits.datasets]
+        return self._labelled(cause_sheets(main_causes(known)))
+
+    def curves(self) -> Iterator[Sheet]:
+        """Detectors without their thresholds."""
+        every = self._report.curves
+        return self._labelled(
+            curve_sheets({k: v for k, v in every.items() if k[0] not in self._report.limits.datasets})
+        )
 
     def paper(self) -> Iterator[Sheet]:
         """The two tables of arXiv 2512.01018."""
-        return paper_sheets(self._report)
+        return self._labelled(paper_sheets(self._report))
 
     def limits(self) -> Iterator[Sheet]:
         """Detectors against physical limits, where the run has test signals."""
-        return limits_sheets(self._report.limits)
+        return self._labelled(limits_sheets(self._report.limits))
 
     def latency(self) -> Iterator[Sheet]:
         """Times of every detector and timed capture."""
@@ -84,13 +99,18 @@ class Tables:
                 (str(e.kind), shown(e.detector), shown(e.dataset), shown(e.capture), sentence(e.reason))
                 for e in self._report.failures
             )
-            yield Sheet("Failed", ("what", "detector", "dataset", "capture", "reason"), failed)
+            yield from self._labelled([Sheet("Failed", ("what", "detector", "dataset", "capture", "reason"), failed)])
         if self._report.unscored:
             rows = tuple(
                 (shown(e.detector), shown(e.capture), scoring, sentence(reason))
                 for e, scoring, reason in self._report.unscored
             )
-            yield Sheet("Not scored", ("detector", "capture", "scoring", "reason"), rows)
+            yield from self._labelled([Sheet("Not scored", ("detector", "capture", "scoring", "reason"), rows)])
+
+    def _labelled(self, tables: Iterable[Sheet]) -> Iterator[Sheet]:
+        """Tables that mark the rows of detectors whose results were read from files."""
+        labels = {shown(name): self._report.label(name, shown(name)) for name in self._report.read_only}
+        return (table.renamed("detector", labels) for table in tables)
 
 
 def markdown(report: Report) -> str:
@@ -132,7 +152,7 @@ def _leaderboards(report: Report) -> Iterator[Sheet]:
         for about, estimates in members:
             shown_here = [(estimates[by.name], by) for by in columns]
             cells = [interval(e.value, e.low, e.high, by.digits, by.factor) for e, by in shown_here]
-            cells[1:1] = [significant(about["p50_us"], 3), significant(about["p99_us"], 3)]
+            cells[1:1] = [time_us(about, "p50_us"), time_us(about, "p99_us")]
             cells += [number(about["chance_recall"], 3)] if open_world else []
             cells += [str(about["errors"]), f"{about['scored_frames']} of {about['frames']}"]
             rows.append((shown(about["detector"]), *cells))
