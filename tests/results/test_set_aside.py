@@ -41,7 +41,7 @@ def test_detections_that_a_scoring_set_aside_are_judged_all_the_same(report: Rep
     boards = report.leaderboard.set_index(["detector", "scoring"])
     assert boards.loc[("bold", "frame"), "f1"] > 0.9
     assert one.precision == boards.loc[("bold", "object"), "precision"] < 0.6
-    assert one.false_alarms_per_minute == boards.loc[("bold", "object"), "false_alarms"]
+    assert one.false_alarms_per_minute == boards.loc[("bold", "object"), "false_alarms_per_minute"]
     assert one.judged == one.frames
     assert one.share > 0.5
 
