@@ -1,6 +1,5 @@
 """A scoring that looks at few detections does not hide the others."""
 
-
 import pytest
 
 from tests.fixtures.chance import reseeded
@@ -42,7 +41,7 @@ def test_detections_that_a_scoring_set_aside_are_judged_all_the_same(report: Rep
     assert boards.loc[("bold", "frame"), "f1"] > 0.9
     assert one.precision == boards.loc[("bold", "object"), "precision"] < 0.6
     assert one.false_alarms_per_minute == boards.loc[("bold", "object"), "false_alarms_per_minute"]
-    assert one.judged == one.frames
+    assert one.judged <= one.frames < one.found
     assert one.share > 0.5
 
 
