@@ -189,7 +189,23 @@ def test_printed_form_subtracts_the_printed_offsets():
     steps = {step.label: step for step in load_detector("paper-as-printed").config.steps}
     for channel, offset_rad in ((5, 0.0522), (9, 0.0209)):
         assert np.deg2rad(steps["azimuth"].params_for(channel)[0]["bias_deg"]) == pytest.approx(offset_rad, abs=1e-8)
-    assert steps["range"].params == {"geometry": "paper", "bias_m": "paper"}
+    assert steps["range"].params["bias_m"] == "paper"
+
+
+def test_printed_form_follows_every_letter_that_paper_does_not():
+    paper, printed = (
+        {step.label: step.params for step in load_detector(name).config.steps} for name in ("paper", "paper-as-printed")
+    )
+    different = {
+        label: {k: v for k, v in params.items() if paper[label].get(k) != v} for label, params in printed.items()
+    }
+    del different["azimuth"]
+    assert {label: params for label, params in different.items() if params} == {
+        "score.snr": {"delay_unit": "samples"},
+        "pdoa": {"phase": "arctan"},
+        "range": {"geometry": "paper", "bias_m": "paper", "speed_of_light": "rounded", "tap_ns": 1.0},
+        "dbscan": {"when": "exceeded"},
+    }
 
 
 @pytest.mark.parametrize("name", sorted(EXPECTED - {"null", "constant", "oracle"}))

@@ -51,7 +51,7 @@ def reasons(folder: RunFolder) -> list[str]:
 def test_results_read_from_files_score_as_those_of_the_detector_that_wrote_them(experiment, tmp_path):
     folder = run_experiment(experiment, tmp_path / "run", jobs=1)
     assert reasons(folder) == []
-    rows = folder.scores().set_index("detector").drop(columns=["capture", "dataset"])
+    rows = folder.scores().set_index("detector").drop(columns=["capture", "dataset", "causes"])
     assert rows.loc["mine"].reset_index(drop=True).equals(rows.loc["cfar-os"].reset_index(drop=True))
     assert {e.detector for e in folder.entries() if e.kind == "stability"} == {"cfar-os"}
     assert verify(folder).passed, verify(folder).problems
@@ -130,7 +130,7 @@ def test_reported_times_are_marked_and_kept(make_experiment, mine, tmp_path):
     assert [(one.kind, one.status) for one in folder.entries()] == [("accuracy", "done")]
     np.testing.assert_array_equal(folder.times_us(entry.unit), np.arange(10.0, 55.0))
     assert entry.facts["reported_times"]["p50_us"] == 32
-    assert "| 32 (as reported) |" in markdown(Report(folder))
+    assert "| 32.0 (as reported) |" in markdown(Report(folder))
     assert verify(folder).passed, verify(folder).problems
     entry.facts["reported_times"]["p50_us"] = 1.0
     folder.record(entry)

@@ -135,8 +135,14 @@ def print_report(report: Report) -> None:
 def print_leaderboard(report: Report) -> None:
     """Print how the detectors did on each dataset, best first, and what did not work."""
     from uwbbench.show.text.quantity import Quantity, undefined_titles
+    from uwbbench.show.text.report import Tables
     from uwbbench.show.text.wording import set_aside_warning
 
+    for sheet in Tables(report).published():
+        print_table(sheet.title, sheet.columns, sheet.rows)
+        for note in sheet.notes:
+            typer.echo(f"  {note}")
+        typer.echo()
     quantities = Quantity.of_all(report.metrics.brief)
     groups: dict[str, list[list[str]]] = {}
     open_world: set[str] = set()

@@ -209,6 +209,17 @@ class Report:
         return rows >= set(published.ROWS)
 
     @cached_property
+    def published(self) -> list[dict[str, Any]]:
+        """Every published cell beside that of the first detector and scoring of this run; none for other runs."""
+        if not self.repeats_the_paper:
+            return []
+        table, datasets = self.paper_tables, [used["label"] for used in self.experiment["datasets"]]
+        scoring = next(rule.scoring for rule in self.folder.rules if rule.scoring in set(table["scoring"]))
+        detector = next(name for name in self.detectors if name in set(table["detector"]))
+        rows = published.beside(table, detector, scoring, datasets)
+        return [{"detector": detector, "scoring": scoring} | row for row in rows]
+
+    @cached_property
     def chains(self) -> pd.DataFrame:
         """Detections left behind each step, one row for each detector, dataset and step, captures added up."""
         import pandas as pd
@@ -315,6 +326,7 @@ class Report:
                 for key, curve in self.curves.items()
             ],
             "paper_tables": self.paper_tables.to_dict("records"),
+            "published": self.published,
             "chains": self.chains.to_dict("records"),
             "limits": self.limits.to_dict(),
             "latency": [{**facts_of(entry), **entry.facts} for entry in self._of_kind("latency")],

@@ -38,6 +38,12 @@ def summary(content: Content) -> Section:
     return Section("summary", "Summary", sentences=tuple(said), warnings=warnings, notes=(_counts(content),))
 
 
+def published(content: Content) -> Section | None:
+    """Published figures beside this run's, and the difference."""
+    sheets = tuple(Tables(content.report).published())
+    return Section("published", "Published and here", sheets=sheets) if sheets else None
+
+
 def paper_first(content: Content) -> Section | None:
     """The paper's tables where the run repeats all of them: they are what it was made for."""
     return _paper(content) if content.report.repeats_the_paper else None
@@ -130,6 +136,7 @@ def manifest(content: Content) -> Section:  # noqa: ARG001 - the template shows 
 
 SECTIONS: tuple[Writer, ...] = (
     summary,
+    published,
     limits,
     paper_first,
     leaderboard,

@@ -55,14 +55,14 @@ def interval(value: object, low: object, high: object, digits: int, scale: float
 
 
 def time_us(row: Mapping[str, Any], key: str) -> str:
-    """Whole microseconds of a leaderboard's row; of a results file they are as reported, not measured here.
+    """Microseconds of a leaderboard's row; of a results file they are as reported, not measured here.
 
     Examples
     --------
     >>> time_us({"p50_us": 41.7, "results_file": True}, "p50_us")
-    '42 (as reported)'
+    '41.7 (as reported)'
     """
-    text = number(row[key], 0)
+    text = significant(row[key], 3)
     return f"{text} (as reported)" if row["results_file"] and text != UNDEFINED else text
 
 

@@ -14,7 +14,7 @@ from uwbbench.show.text.captures_sheets import captures_sheet, each_capture_shee
 from uwbbench.show.text.error_sheets import cause_sheets, curve_sheets, main_causes
 from uwbbench.show.text.limits_sheets import limits_sheets
 from uwbbench.show.text.numbers import interval, number, time_us
-from uwbbench.show.text.paper_sheets import paper_sheets
+from uwbbench.show.text.paper_sheets import paper_sheets, published_sheets
 from uwbbench.show.text.quantity import Quantity, undefined_titles
 from uwbbench.show.text.sheet import Sheet, escaped, sentence, shown
 from uwbbench.show.text.wording import TABLES, set_aside_warning
@@ -24,6 +24,7 @@ def sheets(report: Report) -> list[Sheet]:
     """All tables of a report: leaderboards, the paper's tables, times, and what did not work."""
     tables = Tables(report)
     parts = (
+        tables.published,
         tables.limits,
         tables.leaderboards,
         tables.causes,
@@ -47,6 +48,10 @@ class Tables:
 
     def __init__(self, report: Report) -> None:
         self._report = report
+
+    def published(self) -> Iterator[Sheet]:
+        """Published figures beside this run's, where it covers the rows of the paper."""
+        return self._labelled(published_sheets(self._report))
 
     def leaderboards(self) -> Iterator[Sheet]:
         """One for each dataset, scoring and table."""
