@@ -16,6 +16,7 @@ from uwbbench.results.leaderboard.suites import Suite
 from uwbbench.results.results import errors_in
 from uwbbench.show.html.cell import Cell, Table
 from uwbbench.show.site import charts
+from uwbbench.show.site.error_pictures import error_pictures
 from uwbbench.show.site.names import Names
 from uwbbench.show.text.numbers import between, interval, number, p_value
 from uwbbench.show.text.quantity import Quantity, undefined_titles
@@ -193,6 +194,11 @@ class Content:
         """Chart of the errors on the first board."""
         spec = charts.errors(section.main, section.title, self._labels(section.suite))
         return None if spec is None else (charts.svg(spec), _described(spec))
+
+    def causes_and_curves(self, section: Section) -> tuple[tuple[str, str], ...]:
+        """Charts of where errors come from, and of detectors without their thresholds."""
+        drawn = error_pictures(section.main, section.title, self._labels(section.suite))
+        return tuple((charts.svg(spec), _described(spec)) for spec in drawn)
 
     def _labels(self, suite: Suite) -> dict[str, str]:
         return {one.key: self.names.detectors[one.key] for one in suite.contenders}
