@@ -115,6 +115,20 @@ def test_a_chart_is_well_formed_and_has_no_colours_of_paper(alice: Path) -> None
     assert "SIMULATED" in words
 
 
+def test_a_dataset_shows_causes_of_errors_and_every_threshold_and_says_simulated(alice: Path) -> None:
+    content = content_of(alice)
+    (section,) = content.sections
+    said = [text for _, text in content.causes_and_curves(section)]
+    assert [text.split(".")[0].split(": ")[-1] for text in said] == [
+        "causes of errors",
+        "precision against recall",
+        "recall against false alarms",
+    ]
+    assert all("SIMULATED" in text for text in said)
+    page = next(page for page in pages(content) if page.address == section.address)
+    assert "Causes of errors, and every threshold" in [part.title for part in page.parts]
+
+
 def test_no_absolute_time_of_several_machines_is_in_a_ranking(alice: Path, tmp_path: Path) -> None:
     content = content_of(alice, elsewhere(alice, tmp_path / "far", 2.0))
     for page in pages(content):

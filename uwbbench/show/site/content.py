@@ -16,6 +16,7 @@ from uwbbench.show.html.cell import Cell, Table
 from uwbbench.show.looks import Look, looks
 from uwbbench.show.site import charts
 from uwbbench.show.site.cells import metric_cell, pair_cell, pair_text, quantity, speed_cell
+from uwbbench.show.site.error_pictures import error_pictures
 from uwbbench.show.site.names import Names
 from uwbbench.show.text.numbers import p_value
 from uwbbench.show.text.quantity import undefined_titles
@@ -221,6 +222,11 @@ class Content:
         """Chart of the errors on the first board."""
         spec = charts.errors(section.main, section.title, self.labels)
         return None if spec is None else (charts.svg(spec), _described(spec))
+
+    def causes_and_curves(self, section: Section) -> tuple[tuple[str, str], ...]:
+        """Charts of where errors come from, and of detectors without their thresholds."""
+        drawn = error_pictures(section.main, section.title, self.labels)
+        return tuple((charts.svg(spec), _described(spec)) for spec in drawn)
 
     def pairs(self, ranking: Ranking) -> Table:
         """All comparisons of a board."""

@@ -169,7 +169,14 @@ def _dataset(content: Content, section: Section) -> Page:
     ]
     facts = Part("What was compared", facts=tuple(content.suite_facts(suite)), tables=(_captures(section),))
     lead = f"Dataset of {content.names.suite(suite)}."
-    parts = (first, *boards, facts, Part("How to read it", notes=(*HOW, *_margins([section]))))
+    explained = Part("Causes of errors, and every threshold", charts=content.causes_and_curves(section))
+    parts = (
+        first,
+        *boards,
+        *([explained] if explained.charts else []),
+        facts,
+        Part("How to read it", notes=(*HOW, *_margins([section]))),
+    )
     return Page(section.address, section.label, badge({section.source}), lead, parts)
 
 
