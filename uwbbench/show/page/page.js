@@ -47,7 +47,8 @@
     }
     fitted.title.text = wrapped(head.text, letters);
     fitted.title.subtitle = wrapped(head.subtitle ?? "", letters * 1.12);
-    const columns = Math.max(2, Math.floor(place.clientWidth / 170)), lines = fitted.title.text.length + fitted.title.subtitle.length - 2;
+    const named = spec.layer.some((layer) => layer.encoding?.y?.type === "nominal");
+    const columns = Math.max(1, Math.floor((place.clientWidth - (named ? 200 : 50)) / 150)), lines = fitted.title.text.length + fitted.title.subtitle.length - 2;
     fitted.height = spec.height + 15 * lines + 18 * Math.max(0, legendLines(fitted, columns) - 1);
     const made = await vegaEmbed(place, fitted, options);
     views.set(place, { ...made, finalize: made.finalize, source: spec });
