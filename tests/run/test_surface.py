@@ -2,9 +2,11 @@
 
 from dataclasses import replace
 
+from uwbbench.results import Report
 from uwbbench.run import rescore, run_experiment
 from uwbbench.run.experiment import read_experiment
 from uwbbench.run.folder.verify import verify
+from uwbbench.show.text.report import markdown
 
 EXPERIMENT = {
     "detectors": ["paper"],
@@ -25,6 +27,8 @@ def test_positions_are_scored_by_the_visible_face_and_scored_again_by_the_other(
     assert "surface" not in usual.manifest["experiment"]
     columns = ["table", "tp", "fp", "fn", "mae_m"]
     assert not folder.scores()[columns].equals(usual.scores()[columns])
+    note = "distances to the part of an outline that the receiver can see (surface: visible)"
+    assert (note in markdown(Report(folder)), note in markdown(Report(usual))) == (True, False)
     rescore(folder, [replace(rule, surface="outline") for rule in folder.rules])
     assert folder.scores()[columns].equals(usual.scores()[columns])
     assert verify(folder).passed
