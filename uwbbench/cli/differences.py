@@ -28,6 +28,7 @@ def print_comparison(comparison: Comparison, most: int) -> None:
     _scores(comparison)
     _times(comparison)
     _flips(comparison, most)
+    _causes(comparison, most)
     render.print_notes(comparison.notes)
 
 
@@ -107,6 +108,17 @@ def _flips(comparison: Comparison, most: int) -> None:
     if most:
         columns = ("detector", "dataset", "capture", "frame", "time (s)", "A", "B", "error A (cm)", "error B (cm)")
         render.print_table("The worst first", columns, list(_worst(comparison, most)))
+
+
+def _causes(comparison: Comparison, most: int) -> None:
+    grown = [change for change in comparison.causes if change.growth > 0]
+    rows = [
+        (shown(one.detector), one.error, one.cause, str(one.before), str(one.after), f"{one.growth:+d}")
+        for one in [*grown, *(change for change in comparison.causes if change.growth < 0)][: most or None]
+    ]
+    if rows:
+        title = f"Causes of errors ({comparison.scoring} scoring), those that grew first"
+        render.print_table(title, ("detector", "error", "cause", "A", "B", "B - A"), rows)
 
 
 def _worst(comparison: Comparison, most: int) -> Iterator[tuple[str, ...]]:

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+from uwbbench.measure.accuracy.judge import Scene
 from uwbbench.measure.accuracy.scoring import ScoringRules
 from uwbbench.run.folder.folder import RunFolder
 from uwbbench.run.folder.journal import Entry
-from uwbbench.run.folder.scored import CAUSES, rules_of, score_rows, table_of, with_causes, with_metrics
+from uwbbench.run.folder.scored import CAUSES, rules_of, scorable, score_rows, table_of, with_causes, with_metrics
 
 
 def rescore(folder: RunFolder, rules: Sequence[ScoringRules] | None = None) -> None:
@@ -44,7 +45,9 @@ def _scored_again(folder: RunFolder, entry: Entry, rules: Sequence[ScoringRules]
     These hold under the rules of the run alone; under others they are not known.
     """
     detections, header = folder.detections(entry.unit), folder.header(entry.capture_id)
-    rows = with_causes(score_rows(detections, header, rules), detections, header, rules)
+    rows = score_rows(detections, header, rules)
+    if scorable(rows):
+        rows = with_causes(rows, detections, Scene.of(detections, header), rules)
     if detections.candidates is None:
         same = {rule.scoring for rule in set(rules) & set(rules_of(folder.manifest["experiment"]))}
         known = {(row["scoring"], row["table"]): row[CAUSES] for row in entry.scores if CAUSES in row}

@@ -25,7 +25,7 @@ from uwbbench.measure.accuracy.scoring import ScoringRules
 from uwbbench.run.folder.identity import accuracy_identity
 from uwbbench.run.folder.journal import Entry, Status
 from uwbbench.run.folder.reported import REPORTED_FACT, RESULTS_FACT, reported_times
-from uwbbench.run.folder.scored import score_rows, with_causes
+from uwbbench.run.folder.scored import scorable, score_rows, with_causes
 from uwbbench.run.plan import Unit, reason_of
 
 
@@ -140,7 +140,11 @@ def _detected(job: Job) -> Finished:
         stored, results = _read(unit, capture)
         detections, identity = stored.detections, ResultsFolder(unit.detector).identity(stored.sha256)
     header = capture.header
-    rows = score_rows(detections, header, job.rules)
+    rows, curve = score_rows(detections, header, job.rules), None
+    if scorable(rows):
+        scene = Scene.of(detections, header)
+        rows = with_causes(rows, detections, scene, job.rules)
+        curve = ranked(detections, scene, job.rules[0], unit.detector.score)
     facts = {
         "source": header.source,
         "frames": len(header),
@@ -159,11 +163,9 @@ def _detected(job: Job) -> Finished:
         "done",
         identity=accuracy_identity(identity, capture.sha256, job.rules),
         capture_id=unit.capture_id,
-        scores=with_causes(rows, detections, header, job.rules),
+        scores=rows,
         facts=facts,
     )
-    scorable = any(row["status"] == "scored" for row in rows)
-    curve = ranked(detections, Scene.of(detections, header), job.rules[0], unit.detector.score) if scorable else None
     kept = detections.candidates if any(rule.scoring == "peak" for rule in job.rules) else None
     return Finished(
         entry=entry,

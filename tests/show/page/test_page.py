@@ -78,6 +78,8 @@ def test_every_chart_follows_the_schema_of_vega_lite_and_says_that_it_is_simulat
         "pareto",
         "range",
         "errors",
+        "causes",
+        "curves",
         "latency",
         "radargram",
         "map",

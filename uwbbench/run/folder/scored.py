@@ -68,7 +68,7 @@ def score_rows(detections: Detections, header: CaptureHeader, rules: Iterable[Sc
 
 
 def with_causes(
-    rows: Iterable[Mapping[str, Any]], detections: Detections, header: CaptureHeader, rules: Iterable[ScoringRules]
+    rows: Iterable[Mapping[str, Any]], detections: Detections, scene: Scene, rules: Iterable[ScoringRules]
 ) -> list[dict[str, Any]]:
     """Rows with the causes of their errors, as JSON text under ``causes``.
 
@@ -78,18 +78,22 @@ def with_causes(
         Of :func:`score_rows`; those that are not scored stay as they are.
     detections : Detections
         With their candidates; without them the causes of misses are not known.
-    header : CaptureHeader
+    scene : Scene
+        Of the same capture and detections.
     rules : iterable of ScoringRules
         That gave the rows.
     """
     by_name = {rule.scoring: rule for rule in rules}
     completed = [dict(row) for row in rows]
-    scored = [row for row in completed if row["status"] == "scored"]
-    scene = Scene.of(detections, header) if scored else None
-    for row in scored:
-        if scene is not None:
+    for row in completed:
+        if row["status"] == "scored":
             row[CAUSES] = canonical(causes(detections, scene, by_name[row["scoring"]], row["table"]).to_dict())
     return completed
+
+
+def scorable(rows: Iterable[Mapping[str, Any]]) -> bool:
+    """Whether any scoring was possible, so that there is a :class:`Scene` too."""
+    return any(row["status"] == "scored" for row in rows)
 
 
 def causes_of(row: Mapping[str, Any]) -> Causes | None:

@@ -10,7 +10,9 @@ from uwbbench.results.error_causes import ErrorCauses
 from uwbbench.show.charts.chart import PLAIN_NUMBERS, Series, Spec, axis, chart
 from uwbbench.show.text.numbers import number, rounded
 
-ROW_PX = 26
+ROW_PX = 34
+LEGEND_COLUMNS = 3
+"""The plot is narrow beside the names of the causes, and so is its legend."""
 
 
 def causes_of_errors(title: str, causes: Sequence[ErrorCauses], names: Mapping[str, str]) -> Spec | None:
@@ -42,7 +44,11 @@ def causes_of_errors(title: str, causes: Sequence[ErrorCauses], names: Mapping[s
     for row in rows:
         dearest[row["cause"]] = max(dearest[row["cause"]], row["gain"])
     order = sorted(dearest, key=lambda cause: (-dearest[cause], cause))
-    look = Series(names, [row["detector"] for row in rows]).encoding()
+    series = Series(names, [row["detector"] for row in rows])
+    look = series.encoding()
+    for channel in look.values():
+        channel["legend"] = {**channel["legend"], "columns": LEGEND_COLUMNS}
+    beside = {"field": "detector", "type": "nominal", "scale": {"domain": series.detectors}}
     x = axis("gain", "Gain of F1 if it were gone", scale={"zero": True}, axis={"format": PLAIN_NUMBERS, "tickCount": 6})
     place = {"field": "cause", "type": "nominal", "title": None, "sort": order}
     y = {**place, "axis": {"labelLimit": 260, "grid": True}}
@@ -53,7 +59,7 @@ def causes_of_errors(title: str, causes: Sequence[ErrorCauses], names: Mapping[s
     ]
     points = {
         "mark": {"type": "point", "filled": True, "size": 85, "opacity": 0.85},
-        "encoding": {"x": x, "y": y, **look, "tooltip": tooltip},
+        "encoding": {"x": x, "y": y, "yOffset": beside, **look, "tooltip": tooltip},
     }
     subtitle = "Each cause taken away alone: misses found, false detections gone. Gains do not add up."
     return chart(title, subtitle, [points], data={"values": rows}, height=max(140, ROW_PX * len(order)))

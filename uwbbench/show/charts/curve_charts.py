@@ -7,12 +7,16 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from uwbbench.measure.accuracy.intervals import Interval
+from uwbbench.measure.accuracy.intervals import INNER_UNITS, Interval
 from uwbbench.results.ranked_curves import RankedCurve
 from uwbbench.show.charts.chart import PLAIN_NUMBERS, Series, Spec, axis, chart
 from uwbbench.show.text.numbers import interval, number, rounded, significant
 
 SHARE: Spec = {"scale": {"domain": [0, 1], "nice": False}, "axis": {"format": PLAIN_NUMBERS, "tickCount": 6}}
+
+SUBTITLE = (
+    "A line: every threshold of the score. A mark: the detector as it is set; bars: intervals, from 12 scenes on."
+)
 
 
 def precision_against_recall(title: str, curves: Mapping[str, RankedCurve], names: Mapping[str, str]) -> Spec | None:
@@ -36,9 +40,8 @@ def precision_against_recall(title: str, curves: Mapping[str, RankedCurve], name
     ]
     points = [_point(names[name], curve, "recall", "precision") for name, curve in drawn.items()]
     x, y = axis("x", "Recall", **SHARE), axis("y", "Precision", **SHARE)
-    subtitle = "Every threshold of the score. Marks: each detector as it is set, with its intervals."
     return chart(
-        title, subtitle, _layers(Series(names, [row["detector"] for row in rows]), x, y, points), data={"values": rows}
+        title, SUBTITLE, _layers(Series(names, [row["detector"] for row in rows]), x, y, points), data={"values": rows}
     )
 
 
@@ -72,9 +75,8 @@ def recall_against_false_alarms(title: str, curves: Mapping[str, RankedCurve], n
         "x", "False alarms a minute (log; left end: none)", scale=scale, axis={"format": PLAIN_NUMBERS, "tickCount": 6}
     )
     y = axis("y", "Recall", **SHARE)
-    subtitle = "Every threshold of the score. Marks: each detector as it is set, with its intervals."
     return chart(
-        title, subtitle, _layers(Series(names, [row["detector"] for row in rows]), x, y, points), data={"values": rows}
+        title, SUBTITLE, _layers(Series(names, [row["detector"] for row in rows]), x, y, points), data={"values": rows}
     )
 
 
@@ -90,14 +92,15 @@ def _steps(curve: RankedCurve, across: Interval, up: Interval) -> list[tuple[flo
 
 
 def _point(name: str, curve: RankedCurve, across: str, up: str, least: float = 0.0) -> Spec:
-    """A detector as it is set; its interval is as short as its value where there is none."""
+    """A detector as it is set; its bar is as short as its value where too few scenes give an inner interval."""
     point: Spec = {"detector": name}
-    for key, quantity in (("x", across), ("y", up)):
+    for key, quantity, floor in (("x", across, least), ("y", up, 0.0)):
         one = curve.setting[quantity]
         value, low, high = (float(end) for end in (one.value, one.low, one.high))
-        value = least if math.isnan(value) else max(value, least)
-        point |= {key: rounded(value), f"{key}low": rounded(value if math.isnan(low) else max(low, least))}
-        point |= {f"{key}high": rounded(value if not math.isfinite(high) else high)}
+        value = floor if math.isnan(value) else max(value, floor)
+        bar = curve.scenes >= INNER_UNITS and math.isfinite(low) and math.isfinite(high)
+        ends = (max(low, floor), high) if bar else (value, value)
+        point |= {key: rounded(value), f"{key}low": rounded(ends[0]), f"{key}high": rounded(ends[1])}
     recall, precision, alarms = (curve.setting[key] for key in ("recall", "precision", "false_alarms_per_minute"))
     point["text"] = ", ".join(
         f"{what} {interval(float(one.value), float(one.low), float(one.high), 3)}"
@@ -108,7 +111,7 @@ def _point(name: str, curve: RankedCurve, across: str, up: str, least: float = 0
 
 
 def _layers(series: Series, x: Spec, y: Spec, points: list[Spec]) -> list[Spec]:
-    look, quiet = series.encoding(), series.encoding(legend=False)
+    look = series.encoding()
     names = {"field": "detector", "title": "Detector"}
     bars = [
         {
@@ -118,7 +121,7 @@ def _layers(series: Series, x: Spec, y: Spec, points: list[Spec]) -> list[Spec]:
                 "x": {**x, "field": "xlow"} if level else x,
                 "y": y if level else {**y, "field": "ylow"},
                 **({"x2": {"field": "xhigh"}} if level else {"y2": {"field": "yhigh"}}),
-                "color": quiet["color"],
+                "color": look["color"],
             },
         }
         for level in (True, False)
@@ -130,7 +133,7 @@ def _layers(series: Series, x: Spec, y: Spec, points: list[Spec]) -> list[Spec]:
                 "x": x,
                 "y": y,
                 "order": {"field": "order"},
-                "color": quiet["color"],
+                "color": look["color"],
                 "tooltip": [names, {"field": "text", "title": "Threshold"}],
             },
         },
