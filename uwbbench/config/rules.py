@@ -15,6 +15,9 @@ Scoring = Literal["frame", "peak", "object"]
 Table = Literal["filtering", "mapping"]
 """After which half of a detector: its filters, or its clustering."""
 
+Surface = Literal["outline", "visible"]
+"""What the error of a position is the distance to: the outline, 0 inside it, or what the receiver sees of it."""
+
 GateRadius = Annotated[float, Field(default=0.20, gt=0, description="Largest error of a true detection.")]
 """In metres."""
 

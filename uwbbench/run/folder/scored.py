@@ -30,7 +30,9 @@ def rules_of(experiment: Mapping[str, Any]) -> tuple[ScoringRules, ...]:
     """Scoring rules of an experiment as the manifest holds it, one for each scoring."""
     region = Region(**RegionModel.model_validate(experiment["region"]).limits)
     return tuple(
-        ScoringRules(scoring, experiment["gate_m"], region, experiment["strongest"])
+        ScoringRules(
+            scoring, experiment["gate_m"], region, experiment["strongest"], experiment.get("surface", "outline")
+        )
         for scoring in experiment["scoring"]
     )
 
@@ -55,7 +57,7 @@ def score_rows(detections: Detections, header: CaptureHeader, rules: Iterable[Sc
     for rule in rules:
         about = {"scoring": rule.scoring, "table": "filtering"}
         try:
-            scores = score(detections, header, rule.scoring, rule.gate_m, rule.region, rule.strongest)
+            scores = score(detections, header, rule.scoring, rule.gate_m, rule.region, rule.strongest, rule.surface)
         except ScoringError as error:
             rows.append({**about, "status": "unscored", "reason": str(error)})
             continue

@@ -164,7 +164,9 @@ def _leaderboards(report: Report) -> Iterator[Sheet]:
         title = f"{shown(dataset)}, {source.upper()}: {scoring} scoring, {TABLES[table]}"
         board = dataset, source, scoring, table
         few = [one for one in report.set_aside if (one.dataset, one.source, one.scoring, "filtering") == board]
-        notes = (*map(set_aside_warning, few), *_leaderboard_notes(members, quantities, report.metrics))
+        seen = table == "mapping" and report.folder.rules[0].surface == "visible"
+        faces = ["Errors are distances to the part of an outline that the receiver can see (surface: visible)."] * seen
+        notes = (*map(set_aside_warning, few), *faces, *_leaderboard_notes(members, quantities, report.metrics))
         yield Sheet(title, ("detector", *heads, *extra), tuple(rows), notes)
 
 
