@@ -107,6 +107,7 @@ def run_experiment(
     workers = usable_cores() if jobs is None else max(1, jobs)
     folder = _resumed(experiment, out, workers) if resume else _created(experiment, out, workers)
     todo = plan(experiment)
+    folder.update_manifest(scenes={**folder.manifest.get("scenes", {}), **todo.scenes})
     try:
         with _terminable():
             _Run(folder, experiment, todo, workers, progress).carry_out()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 from uwbbench.api.text import one_line
@@ -54,10 +54,13 @@ class Plan:
         Accuracy first, captures together; latency last.
     failures : tuple of Entry
         Datasets whose captures could not be listed.
+    scenes : dict of dict
+        Scene of each capture, by dataset and capture.
     """
 
     units: tuple[Unit, ...]
     failures: tuple[Entry, ...]
+    scenes: dict[str, dict[str, str]] = field(default_factory=dict)
 
 
 def plan(experiment: Experiment) -> Plan:
@@ -65,9 +68,11 @@ def plan(experiment: Experiment) -> Plan:
     accuracy: list[Unit] = []
     latency: list[Unit] = []
     failures: list[Entry] = []
+    scenes: dict[str, dict[str, str]] = {}
     for source in experiment.datasets:
         try:
             references = source.references()
+            scenes[source.label] = source.scenes([ref.name for ref in references])
         except Exception as error:  # noqa: BLE001 - an adapter may raise anything; the other datasets still run
             failures.append(
                 Entry(
@@ -84,7 +89,7 @@ def plan(experiment: Experiment) -> Plan:
         accuracy += [Unit("accuracy", d, source.label, ref) for ref in references for d in experiment.detectors]
         timed = references if experiment.latency.captures == "all" else references[:1]
         latency += [Unit("latency", d, source.label, ref) for ref in timed for d in experiment.detectors]
-    return Plan(tuple(accuracy + (latency if experiment.latency.enabled else [])), tuple(failures))
+    return Plan(tuple(accuracy + (latency if experiment.latency.enabled else [])), tuple(failures), scenes)
 
 
 def reason_of(error: BaseException) -> str:

@@ -16,7 +16,7 @@ from uwbbench.measure.accuracy.matching import match
 from uwbbench.measure.accuracy.metrics.detection import Precision, Recall
 from uwbbench.measure.accuracy.metrics.error import MeanAbsoluteError, StandardDeviation
 from uwbbench.measure.accuracy.scoring import SCORINGS, Region, ScoringRules, outcomes, score
-from uwbbench.measure.accuracy.stats import bootstrap, evaluate
+from uwbbench.measure.accuracy.stats import evaluate
 
 GOLDEN = json.loads((Path(__file__).parent / "golden" / "plate_post_wall.json").read_text())
 WINDOW_M, RATE_HZ, GATE_M = 10.0, 10.0, 0.2
@@ -531,7 +531,7 @@ def test_resampling_groups_last_a_second_or_more_and_are_the_same_for_all_detect
         assert inside[-1] - inside[0] + 1 / RATE_HZ >= 1.0
     late = outcomes(Detections.empty(np.arange(20, 37)), capture, ScoringRules())["filtering"]
     np.testing.assert_array_equal(late.group, everything.group[20:])
-    assert bootstrap(Recall, [everything]).groups == 3
+    assert len(np.unique(everything.group)) == 3
 
 
 # ---- what bad input gets

@@ -91,9 +91,7 @@ def speed_against_error(title: str, points: Sequence[Point], names: Mapping[str,
         },
     ]
     better = {"higher": "up", "lower": "down", "zero": "towards 0"}[quantity.better]
-    subtitle = (
-        f"Better: left and {better}. Filled: on the front by its values. P: bootstrap probability of being on it."
-    )
+    subtitle = f"Better: left and {better}. Filled: on the front by its values. P: probability of being on it."
     return chart(title, subtitle, layers, data={"values": rows})
 
 

@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 
 from uwbbench.api.errors import CaptureError
-from uwbbench.measure.accuracy.stats import MINIMUM_GROUPS
 from uwbbench.results import radargram
 from uwbbench.results.cases import Case, cases
 from uwbbench.results.curves import error_curve
@@ -21,6 +20,7 @@ from uwbbench.results.pareto import Speed, points, speeds_of_run
 from uwbbench.results.report import Report
 from uwbbench.results.results import Scored
 from uwbbench.results.slices import ALL, Board, Slice, cuts, range_edges_m, slices, span_name
+from uwbbench.results.verdicts import WITHIN
 from uwbbench.show.charts import error_charts, scene_charts, speed_chart, time_chart
 from uwbbench.show.charts.chart import Spec
 from uwbbench.show.text.numbers import number, rounded
@@ -119,13 +119,11 @@ class Content:
         figures = " and ".join(f"{by.title} {by.value_of(estimates[by.name])}" for by in said)
         plural = "capture" if about["captures"] == 1 else "captures"
         what = f"{about['captures']} {about['source']} {plural} of {self.datasets[about['dataset']]}"
-        leader = self.detectors[about["detector"]]
-        text = (
-            f"On {what} ({about['scored_frames']} scored frames, {about['scoring']} scoring), {leader} leads with "
-            f"{figures}"
-        )
-        if math.isnan(estimates[main.name].low):
-            text += f" (no intervals: fewer than {MINIMUM_GROUPS} groups)"
+        board = about["dataset"], about["source"], about["scoring"], about["table"]
+        opening = self.report.ranks[board].opening(self.detectors, figures)
+        text = f"On {what} ({about['scored_frames']} scored frames, {about['scoring']} scoring), {opening}"
+        if estimates[main.name].within:
+            text += f" (intervals {WITHIN})"
         speed = self.speeds.get(about["dataset"], {}).get(about["detector"])
         if speed is None:
             return f"{text}; it was not timed."

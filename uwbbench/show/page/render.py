@@ -11,7 +11,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from uwbbench.measure.accuracy.stats import MINIMUM_GROUPS
+from uwbbench.results.verdicts import INTERVALS
 from uwbbench.run.folder.files import replacing, write_json, write_text
 from uwbbench.show.charts.theme import PAGE, PRINT
 from uwbbench.show.extras import report_tools
@@ -51,8 +51,7 @@ def page(content: Content) -> str:
         counts=_counts(content),
         boards=bool(content.boards),
         confidence=f"{report.experiment['intervals']['confidence']:.0%}",
-        resamples=report.experiment["intervals"]["resamples"],
-        minimum_groups=MINIMUM_GROUPS,
+        intervals=INTERVALS,
         looks=content.looks,
         tables=tables,
         latencies=content.timings,

@@ -53,7 +53,7 @@ def interval(value: object, low: object, high: object, digits: int, scale: float
 
 
 def between(low: object, high: object, digits: int, scale: float = 1.0) -> str:
-    """Interval in brackets; empty where there is none.
+    """Interval in brackets; empty where there is none, open where the data do not reach its upper end.
 
     Parameters
     ----------
@@ -63,6 +63,8 @@ def between(low: object, high: object, digits: int, scale: float = 1.0) -> str:
     scale : float
         From the unit of the ends to the shown one.
     """
+    if high == math.inf:
+        return f"[{number(low, digits, scale)}, ∞)"
     ends = number(low, digits, scale), number(high, digits, scale)
     return "" if UNDEFINED in ends else f"[{ends[0]}, {ends[1]}]"
 
