@@ -83,7 +83,7 @@ def test_intervals_hold_the_value_where_there_are_enough_captures(run: Run) -> N
     assert row["mae_low"] < row["mae"] < row["mae_high"]
     assert row["f1_outer_low"] <= row["f1_low"] <= row["f1"]
     text = markdown(Report(folder))
-    assert "Intervals: inner ones, for scenes like these. Outer ones of F1, at worst: paper-filtering [" in text
+    assert "Intervals: inner ones, for scenes like these. Outer ones of F1, at worst: paper-filtering " in text
     assert "12 scenes: if none of them fails, at most 26% of such scenes do" in text
 
 
