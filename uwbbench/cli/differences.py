@@ -28,6 +28,7 @@ def print_comparison(comparison: Comparison, most: int) -> None:
     _scores(comparison)
     _times(comparison)
     _flips(comparison, most)
+    _causes(comparison, most)
     render.print_notes(comparison.notes)
 
 
@@ -60,7 +61,7 @@ def _scores(comparison: Comparison) -> None:
             (
                 f"{shown(dataset)}, {source.upper()}",
                 f"{scoring}, {table}",
-                shown(change.detector),
+                comparison.label(change.detector),
                 by.axis,
                 number(change.before, by.digits, by.factor),
                 number(change.after, by.digits, by.factor),
@@ -94,7 +95,7 @@ def _times(comparison: Comparison) -> None:
 
 def _flips(comparison: Comparison, most: int) -> None:
     rows = [
-        (shown(detector), before, after, str(count))
+        (comparison.label(detector), before, after, str(count))
         for detector, counter in comparison.flip_counts.items()
         for (before, after), count in counter.most_common()
     ]
@@ -109,9 +110,21 @@ def _flips(comparison: Comparison, most: int) -> None:
         render.print_table("The worst first", columns, list(_worst(comparison, most)))
 
 
+def _causes(comparison: Comparison, most: int) -> None:
+    grown = [change for change in comparison.causes if change.growth > 0]
+    rows = [
+        (shown(one.detector), one.error, one.cause, str(one.before), str(one.after), f"{one.growth:+d}")
+        for one in [*grown, *(change for change in comparison.causes if change.growth < 0)][: most or None]
+    ]
+    if rows:
+        title = f"Causes of errors ({comparison.scoring} scoring), those that grew first"
+        render.print_table(title, ("detector", "error", "cause", "A", "B", "B - A"), rows)
+
+
 def _worst(comparison: Comparison, most: int) -> Iterator[tuple[str, ...]]:
     for flip in comparison.worst[:most]:
-        names = (shown(flip.unit.detector), shown(flip.unit.dataset), shown(flip.unit.capture))
+        unit = flip.unit
+        names = (comparison.label(unit.detector), shown(unit.dataset), shown(unit.capture))
         errors = [number(value, 1, 100) for value in (flip.error_before_m, flip.error_after_m)]
         yield (*names, str(flip.frame), f"{flip.time_s:.2f}", flip.before, flip.after, *errors)
 

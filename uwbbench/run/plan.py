@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Literal
 
+from uwbbench.api.interruption import by_plugin
 from uwbbench.api.text import one_line
 from uwbbench.config.detector import DetectorConfig
 from uwbbench.config.source import CaptureRef
@@ -73,7 +74,9 @@ def plan(experiment: Experiment) -> Plan:
         try:
             references = source.references()
             scenes[source.label] = source.scenes([ref.name for ref in references])
-        except Exception as error:  # noqa: BLE001 - an adapter may raise anything; the other datasets still run
+        except BaseException as error:  # an adapter may raise anything; the other datasets still run
+            if not by_plugin(error):
+                raise
             failures.append(
                 Entry(
                     unit=listing_name(source.label),
@@ -88,7 +91,7 @@ def plan(experiment: Experiment) -> Plan:
             continue
         accuracy += [Unit("accuracy", d, source.label, ref) for ref in references for d in experiment.detectors]
         timed = references if experiment.latency.captures == "all" else references[:1]
-        latency += [Unit("latency", d, source.label, ref) for ref in timed for d in experiment.detectors]
+        latency += [Unit("latency", d, source.label, ref) for ref in timed for d in experiment.runnable]
     return Plan(tuple(accuracy + (latency if experiment.latency.enabled else [])), tuple(failures), scenes)
 
 

@@ -192,3 +192,40 @@ def test_a_manifest_edited_by_hand_is_told_in_one_line(
         told = str(error)
     assert "edited" in told or "was changed after the run ended" in told
     assert "\n" not in told
+
+
+def test_causes_that_grew_come_first_and_add_up_to_what_the_misses_did(
+    found: Comparison, first: RunFolder, second: RunFolder
+) -> None:
+    def misses(run: RunFolder, detector: str) -> int:
+        table = run.scores().query("scoring == 'frame' and detector == @detector and table == 'filtering'")
+        return int(table["fn"].sum())
+
+    growth = [change.growth for change in found.causes]
+    assert growth == sorted(growth, reverse=True)
+    assert {change.detector for change in found.causes} == {"paper-filtering"}
+    missed = [change for change in found.causes if change.error == "missed"]
+    assert sum(change.growth for change in missed) == misses(second, "paper-filtering") - misses(
+        first, "paper-filtering"
+    )
+    fewer = next(change for change in missed if change.cause == "dropped by filter.prominence")
+    assert fewer.growth < 0
+
+
+def test_causes_of_other_rules_and_of_older_runs_are_noted_and_not_compared(
+    first: RunFolder, second: RunFolder, tmp_path: Path
+) -> None:
+    strict = RunFolder(Path(shutil.copytree(second.path, tmp_path / "strict")))
+    rescore(strict, [ScoringRules("frame", 0.1)])
+    by_others = compare(first, strict)
+    assert by_others.causes == ()
+    assert "causes of errors not compared: the runs were scored by different rules" in by_others.notes
+    rescore(strict, first.rules[:1])
+    entries = [json.loads(line) for line in (strict.path / "journal.jsonl").read_text().splitlines()]
+    for entry in entries:
+        for row in entry["scores"]:
+            row.pop("causes")
+    (strict.path / "journal.jsonl").write_text("".join(json.dumps(entry) + "\n" for entry in entries))
+    rescore(strict)
+    older = compare(first, strict)
+    assert any("causes of errors of" in note and "not stored" in note for note in older.notes)

@@ -82,7 +82,7 @@ def _grown(
     def run(frames: int, limit_s: float) -> int:
         until = perf_counter() + limit_s
         done = 0
-        while done < frames and perf_counter() < until:
+        while done < frames and (perf_counter() < until or not done):  # one at least, whoever has the core meanwhile
             step(next(source))
             done += 1
         gc.collect()

@@ -9,7 +9,10 @@ from dataclasses import dataclass
 from typing import Any
 
 from uwbbench.api.errors import ConfigError, nearest
-from uwbbench.measure.accuracy.metrics.choice import MetricChoice
+from uwbbench.api.text import printable
+from uwbbench.config.detector import from_results, marked
+from uwbbench.measure.accuracy.metrics.choice import MetricChoice, combined
+from uwbbench.results.comparison.causes import CauseChange, cause_changes
 from uwbbench.results.comparison.changes import Change, changes
 from uwbbench.results.comparison.flips import Flip, flips
 from uwbbench.results.comparison.scores import ScoreChange, TimeChange, score_changes, time_changes
@@ -18,6 +21,7 @@ from uwbbench.results.report import read_safely
 from uwbbench.run.folder.folder import RunFolder
 
 MOST_FLIPS = 20
+LONGEST_NAME = 60
 
 
 @dataclass(frozen=True)
@@ -40,6 +44,8 @@ class Comparison:
         By detector: frames from which outcome to which.
     worst : tuple of Flip
         The worst first.
+    causes : tuple of CauseChange
+        Causes of errors of that scoring whose count changed, those that grew most first.
     notes : tuple of str
         What was not compared, and what a reader must know.
     """
@@ -54,6 +60,7 @@ class Comparison:
     compared_frames: int
     flip_counts: Mapping[str, Counter[tuple[str, str]]]
     worst: tuple[Flip, ...]
+    causes: tuple[CauseChange, ...]
     notes: tuple[str, ...]
 
     @property
@@ -65,7 +72,15 @@ class Comparison:
     def differs(self) -> bool:
         """Whether anything differs but measured times and the machine, which never repeat."""
         inputs = any(change.kind != "machine" for change in self.changes)
-        return inputs or bool(self.changed_scores) or any(self.flip_counts.values()) or self._unequal
+        return (
+            inputs or bool(self.changed_scores) or any(self.flip_counts.values()) or bool(self.causes) or self._unequal
+        )
+
+    def label(self, detector: str) -> str:
+        """Name of a detector as tables show it, which say so where either run read its results from files."""
+        configs = [one for folder in (self.first, self.second) for one in folder.manifest["experiment"]["detectors"]]
+        read = any(one["name"] == detector and from_results(one) for one in configs)
+        return marked(printable(detector, LONGEST_NAME), results_file=read)
 
     @property
     def _unequal(self) -> bool:
@@ -98,6 +113,7 @@ class Comparison:
                 ],
                 "worst": [_flip(flip) for flip in self.worst],
             },
+            "causes": [{**vars(change), "growth": change.growth} for change in self.causes],
             "notes": list(self.notes),
         }
 
@@ -123,9 +139,7 @@ def compare(first: RunFolder, second: RunFolder, scoring: str | None = None, mos
     with read_safely(first.path):
         rules = {rule.scoring: rule for rule in first.rules}
         settings = {**first.manifest["experiment"]["intervals"], "seed": first.manifest["experiment"]["seed"]}
-        metrics = MetricChoice(
-            [name for folder in (first, second) for name in folder.manifest["experiment"]["metrics"]]
-        )
+        metrics = combined([folder.manifest["experiment"]["metrics"] for folder in (first, second)])
     if scoring is not None and scoring not in rules:
         raise ConfigError(f"{first.path}: was not scored by '{scoring}'.{nearest(scoring, rules)}")
     rule = next(rule for name, rule in rules.items() if scoring in (None, name))
@@ -135,10 +149,11 @@ def compare(first: RunFolder, second: RunFolder, scoring: str | None = None, mos
         scores, unjudged = score_changes(units, list(rules.values()), metrics, settings)
         times, untimed = time_changes(first, second)
         counts, frames, worst = flips(units, rule, most)
+        causes, unexplained = cause_changes((first, second), units, rule)
     if first.rules != second.rules:
         unjudged.insert(0, "the runs were scored by different rules; both are judged here by those of the first")
     ended = [note for folder in (first, second) for note in _seal(folder)]
-    notes = (*ended, *left_out, *unjudged, *untimed, *metrics.notes, *first.damage, *second.damage)
+    notes = (*ended, *left_out, *unjudged, *untimed, *unexplained, *metrics.notes, *first.damage, *second.damage)
     return Comparison(
         first=first,
         second=second,
@@ -150,6 +165,7 @@ def compare(first: RunFolder, second: RunFolder, scoring: str | None = None, mos
         compared_frames=frames,
         flip_counts=counts,
         worst=tuple(worst),
+        causes=tuple(causes),
         notes=notes,
     )
 

@@ -12,17 +12,11 @@ from uwbbench.measure.accuracy.intervals import INNER_UNITS
 from uwbbench.results.leaderboard.ranking import SETTINGS, speeds_by_machine
 from uwbbench.results.leaderboard.suites import Contender, Suite
 from uwbbench.results.verdicts import INTERVALS, WORDS
+from uwbbench.show.html.cell import Cell, Table
 from uwbbench.show.html.render import badge
-from uwbbench.show.site.content import (
-    Cell,
-    Content,
-    Section,
-    Table,
-    metric_cell,
-    pair_cell,
-    quantity,
-    rank_cell,
-)
+from uwbbench.show.site.cells import metric_cell, pair_cell, quantity, rank_cell
+from uwbbench.show.site.content import Content, Section
+from uwbbench.show.site.matrix import CSV, matrix
 from uwbbench.show.text.numbers import interval, number, p_value
 from uwbbench.show.text.sheet import sentence, shown
 from uwbbench.show.text.wording import TABLES
@@ -43,6 +37,8 @@ class Part:
     tables : tuple of Table
     folded : tuple of Table
         Tables that are opened on demand.
+    download : str
+        Address of the first table as a file; where there is one, the table has a filter.
     text : str
         Shown as it is, opened on demand.
     link : (str, str)
@@ -56,6 +52,7 @@ class Part:
     charts: tuple[tuple[str, str], ...] = ()
     tables: tuple[Table, ...] = ()
     folded: tuple[Table, ...] = ()
+    download: str = ""
     text: str = ""
     link: tuple[str, str] = ("", "")
 
@@ -114,6 +111,8 @@ def pages(content: Content) -> Iterator[Page]:
 
 def _index(content: Content) -> Page:
     parts = []
+    if content.sections:
+        parts.append(Part("All detectors on all datasets", tables=(matrix(content),), download=CSV))
     for suite in content.suites:
         sections = content.of_suite(suite)
         name = content.names.suite(suite)
@@ -173,7 +172,14 @@ def _dataset(content: Content, section: Section) -> Page:
     ]
     facts = Part("What was compared", facts=tuple(content.suite_facts(suite)), tables=(_captures(section),))
     lead = f"Dataset of {content.names.suite(suite)}."
-    parts = (first, *boards, facts, Part("How to read it", notes=(*HOW, *_margins([section]))))
+    explained = Part("Causes of errors, and every threshold", charts=content.causes_and_curves(section))
+    parts = (
+        first,
+        *boards,
+        *([explained] if explained.charts else []),
+        facts,
+        Part("How to read it", notes=(*HOW, *_margins([section]))),
+    )
     return Page(section.address, section.label, badge({section.source}), lead, parts)
 
 
