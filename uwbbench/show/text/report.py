@@ -10,7 +10,7 @@ from uwbbench.api.text import one_line
 from uwbbench.measure.accuracy.intervals import INNER_UNITS, failing_share
 from uwbbench.measure.accuracy.metrics.choice import MetricChoice
 from uwbbench.results.report import Report
-from uwbbench.results.verdicts import WITHIN
+from uwbbench.results.verdicts import WITHIN, rank_text
 from uwbbench.show.text.captures_sheets import captures_sheet, each_capture_sheet
 from uwbbench.show.text.error_sheets import cause_sheets, curve_sheets, main_causes
 from uwbbench.show.text.limits_sheets import limits_sheets
