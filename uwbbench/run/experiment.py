@@ -86,7 +86,7 @@ class ExperimentModel(ConfigModel):
     )
     latency: LatencyModel = Field(default_factory=LatencyModel)
     stability: bool = Field(default=True, description="Put the hard cases to each detector; see 'uwbbench stability'.")
-    seed: int = Field(default=0, ge=0, description="Of the resampling behind the intervals.")
+    seed: int = Field(default=0, ge=0, description="Of what reports draw: the probability of being on a front.")
     intervals: IntervalModel = Field(default_factory=IntervalModel)
 
     @field_validator("scoring", mode="before")
@@ -150,7 +150,7 @@ class Experiment:
 
     def to_dict(self) -> dict[str, Any]:
         """Resolved experiment as plain values, without the folders of this machine."""
-        datasets = [{"label": d.label, "use": d.use, "params": d.params, "captures": d.captures} for d in self.datasets]
+        datasets = [dataset.to_dict() for dataset in self.datasets]
         return {
             "schema": 1,
             "name": self.name,
