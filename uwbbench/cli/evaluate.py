@@ -36,7 +36,9 @@ def score(
     opened, pipeline = _open(capture, receiver, detector, settings)
     if opened.truth is None:
         raise ScoringError(f"{capture}: the capture has no ground truth; it can be detected on, but not scored")
-    detections = pipeline.run(opened, candidates=scoring is options.Scoring.PEAK)
+    detections = pipeline.run(
+        opened, candidates=scoring is options.Scoring.PEAK, handed_out=scoring is options.Scoring.LATEST
+    )
     invalid = len(opened) - len(detections.processed)
     notes = [f"{invalid} of {len(opened)} frames are invalid (a sample is not finite): not scored"] if invalid else []
     tables = uwbbench.score(detections, opened, scoring=scoring.value, gate_m=gate_m).to_dict()

@@ -17,6 +17,7 @@ class Scoring(StrEnum):
     FRAME = "frame"
     PEAK = "peak"
     OBJECT = "object"
+    LATEST = "latest"
 
 
 CaptureFile = Annotated[Path, typer.Argument(metavar="CAPTURE", help="Capture file (.h5).", show_default=False)]

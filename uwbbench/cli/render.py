@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
@@ -74,7 +75,7 @@ def print_scores(result: Mapping[str, Any]) -> None:
     times = result["latency_us"]
     if times is not None:
         shown = [f"{key} {number(times[key], 1, 1.0, 'us', 'too few calls')}" for key in _TIMES]
-        typer.echo(f"time a frame, one frame a call ({times['n']} calls): {', '.join(shown)}")
+        typer.echo(f"time a frame from samples to rows, one frame a call ({times['n']} calls): {', '.join(shown)}")
     print_notes(result["notes"])
 
 
@@ -145,6 +146,8 @@ def print_leaderboard(report: Report) -> None:
     for title, rows in groups.items():
         shown = slice(None) if title in open_world else slice(-1)
         print_table(title, columns[shown], [row[shown] for row in rows])
+        if any(not math.isnan(about["p50_us"]) for about, _ in report.estimates):
+            typer.echo(f"  p50: median time of a frame, {report.timed}, on this machine only")
         if title in open_world:
             missing = undefined_titles(report.metrics)
             typer.echo(f"  truth not exhaustive: no {missing}; errors are of matches; compare recall with chance")

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from uwbbench.api.capture import Capture, CaptureHeader
-from uwbbench.api.detections import Detections
+from uwbbench.api.detections import HANDED_OUT, Detections
 from uwbbench.config.source import CaptureRef
 from uwbbench.detect.pipeline import Pipeline
 from uwbbench.measure.accuracy.scoring import ScoringRules
@@ -116,7 +116,7 @@ def _detected(job: Job) -> Finished:
     capture = _opened(job.session, unit.ref)
     with_candidates = any(rule.scoring == "peak" for rule in job.rules)
     pipeline = Pipeline(unit.detector)
-    detections = pipeline.run(capture)
+    detections = pipeline.run(capture, handed_out=True)
     candidates = detections.candidates if with_candidates else None
     header = capture.header
     facts = {
@@ -163,4 +163,6 @@ def _materials(header: CaptureHeader) -> list[str]:
 def _bare(detections: Detections) -> Detections:
     """Detections without the means to find candidates later, which would drag the capture between processes."""
     columns: dict[str, Any] = detections.columns
-    return Detections(**columns, processed=detections.processed, notes=detections.notes, chain=detections.chain)
+    bare = Detections(**columns, processed=detections.processed, notes=detections.notes, chain=detections.chain)
+    answered = detections.answered
+    return bare if answered is None else bare.with_hand_outs(columns[HANDED_OUT], answered)

@@ -5,8 +5,9 @@ Conventions
 * Both runs are judged again under the rules of the first one, so that what differs is what was detected.
 * Differences are second minus first, on the same captures, with paired bootstrap intervals; p-values are adjusted after
   Holm over the detectors of a dataset, scoring and table, for each metric.
-* Of times only the ratio to the reference is compared, and only where both used the same reference. Its interval is
-  that of two independent log-normal values, each inside its run; it does not know how much processes differ.
+* Of times only the ratio to the reference is compared, and only where both used the same reference and timed the same.
+  Its interval is that of two independent log-normal values, each inside its run; it does not know how much processes
+  differ.
 """
 
 from __future__ import annotations
@@ -141,6 +142,9 @@ def time_changes(first: RunFolder, second: RunFolder) -> tuple[list[TimeChange],
     for (dataset, detector), before in sides[0].items():
         after = sides[1].get((dataset, detector))
         if after is None:
+            continue
+        if before.timed != after.timed:
+            missing[f"times not compared: one run timed {before.timed}, the other {after.timed}"] = None
             continue
         if before.reference != after.reference or identities[0] != identities[1]:
             missing["times not compared: the references differ"] = None

@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from uwbbench.results.pareto import Point
+from uwbbench.results.times import WORDS
 from uwbbench.show.charts.chart import HEIGHT, Series, Spec, axis, chart, deadline, limits
 from uwbbench.show.text.numbers import between, number, probability
 from uwbbench.show.text.quantity import Quantity
@@ -44,8 +45,8 @@ def speed_against_error(title: str, points: Sequence[Point], names: Mapping[str,
 
     x = {"scale": {"type": "log", "domain": reach, "nice": False}, "axis": {"format": "~g"}}
     y = {"scale": {"domain": span, "zero": False, "nice": False}}
-    reference = points[0].speed.reference
-    across = axis("ratio", f"Time a frame, in times of {names.get(reference, reference)} (ratio, log)", **x)
+    reference, timed = points[0].speed.reference, WORDS[points[0].speed.timed]
+    across = axis("ratio", f"Time a frame {timed}, in times of {names.get(reference, reference)} (ratio, log)", **x)
     up = axis("value", quantity.axis, **y)
     series = Series(names, [row["detector"] for row in rows])
     colour, marker = series.encoding(None), series.encoding(None, "shape")

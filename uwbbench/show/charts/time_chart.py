@@ -9,7 +9,9 @@ from uwbbench.results.curves import tail_curve
 from uwbbench.show.charts.chart import LINES, Series, Spec, axis, chart, deadline
 
 
-def latency(title: str, times_us: Mapping[str, FloatArray], deadline_us: float, names: Mapping[str, str]) -> Spec:
+def latency(
+    title: str, times_us: Mapping[str, FloatArray], deadline_us: float, names: Mapping[str, str], timed: str
+) -> Spec:
     """Share of calls that take as long as a time or longer, one curve for each detector.
 
     Parameters
@@ -21,6 +23,8 @@ def latency(title: str, times_us: Mapping[str, FloatArray], deadline_us: float, 
         Frame period of the radar.
     names : mapping of str to str
         Labels of detectors.
+    timed : str
+        What the times are of, in words.
     """
     rows = []
     for detector, times in times_us.items():
@@ -58,5 +62,5 @@ def latency(title: str, times_us: Mapping[str, FloatArray], deadline_us: float, 
             },
         },
     ]
-    subtitle = "This machine only. A call right of the dashed line misses the next frame."
+    subtitle = f"Times {timed}, this machine only. A call right of the dashed line misses the next frame."
     return chart(title, subtitle, layers, data={"values": rows})

@@ -21,6 +21,7 @@ from uwbbench.results.pareto import Speed, points, speeds_of_run
 from uwbbench.results.report import Report
 from uwbbench.results.results import Scored
 from uwbbench.results.slices import ALL, Board, Slice, cuts, range_edges_m, slices, span_name
+from uwbbench.results.times import in_words
 from uwbbench.show.charts import error_charts, scene_charts, speed_chart, time_chart
 from uwbbench.show.charts.chart import Spec
 from uwbbench.show.text.numbers import number, rounded
@@ -199,14 +200,14 @@ class Content:
         for dataset in self.datasets:
             times: dict[str, Any] = {}
             deadlines = []
-            for entry in self.report.entries:
-                if (entry.kind, entry.status, entry.dataset) == ("latency", "done", dataset):
-                    parts = [times[entry.detector]] if entry.detector in times else []
-                    times[entry.detector] = np.concatenate([*parts, self.report.folder.times_us(entry.unit)])
-                    deadlines.append(entry.facts["deadline_us"])
+            timed = self.report.measured(dataset)
+            for entry in timed:
+                parts = [times[entry.detector]] if entry.detector in times else []
+                times[entry.detector] = np.concatenate([*parts, self.report.folder.times_us(entry.unit)])
+                deadlines.append(entry.facts["deadline_us"])
             if times:
                 title = self.title("Times of calls", dataset, sources.get(dataset, "measured"))
-                yield time_chart.latency(title, times, min(deadlines), self.detectors)
+                yield time_chart.latency(title, times, min(deadlines), self.detectors, in_words(timed))
 
     @cached_property
     def cases(self) -> list[Case]:
@@ -365,11 +366,7 @@ class Content:
         for dataset in self.datasets:
             row: list[Any] = [None] * len(detectors)
             for detector, index in detectors.items():
-                facts = [
-                    e.facts
-                    for e in self.report.entries
-                    if (e.kind, e.status, e.dataset, e.detector) == ("latency", "done", dataset, detector)
-                ]
+                facts = [entry.facts for entry in self.report.measured(dataset, detector)]
                 if facts:
                     speed = self.speeds.get(dataset, {}).get(detector)
                     ratio = [speed.ratio, speed.low, speed.high] if speed else [None] * 3

@@ -58,6 +58,7 @@ def page(content: Content) -> str:
         latencies=content.timings,
         notes=[sentence(note) for note in report.notes],
         facts=_facts(session, report.experiment),
+        timed=report.timed,
         manifest=json.dumps(manifest, indent=2, ensure_ascii=False),
         made=f"Made by uwbbench {session['versions']['uwbbench']} from a run started {session['started']}.",
         data=embedded(content.data()),

@@ -14,6 +14,7 @@ from uwbbench.results.leaderboard.ranking import Pair, Ranking, Standing, rankin
 from uwbbench.results.leaderboard.runs import Run
 from uwbbench.results.leaderboard.suites import Suite
 from uwbbench.results.results import errors_in
+from uwbbench.results.times import WORDS
 from uwbbench.show.site import charts
 from uwbbench.show.site.names import Names
 from uwbbench.show.text.numbers import between, interval, number, p_value
@@ -257,7 +258,7 @@ class Content:
             ("scoring", f"{', '.join(rule.scoring for rule in rules)}; gate {100 * rules[0].gate_m:g} cm"),
             ("runs", ", ".join(shown(run.name) for run in suite.runs)),
             ("machines", "; ".join(sentence(machine) for machine in machines)),
-            ("reference of times", "none" if reference is None else shown(reference[0])),
+            ("reference of times", "none" if reference is None else f"{shown(reference[0])}, {WORDS[reference[2]]}"),
         ]
 
     def to_dict(self) -> dict[str, Any]:

@@ -10,6 +10,7 @@ from typing import Any
 from uwbbench.measure.accuracy.stats import MINIMUM_GROUPS
 from uwbbench.results.leaderboard.ranking import SETTINGS, SIGNIFICANCE, speeds_by_machine
 from uwbbench.results.leaderboard.suites import Contender, Suite
+from uwbbench.results.times import WORDS
 from uwbbench.show.html.render import badge
 from uwbbench.show.site.content import (
     VERDICTS,
@@ -293,15 +294,21 @@ def _times(content: Content, mine: list[tuple[Suite, Contender]]) -> Table:
         for dataset in suite.datasets:
             for machine, speed in speeds_by_machine(suite, contender, dataset).items():
                 ratio = interval(speed.ratio, speed.low, speed.high, 3)
-                about = (sentence(machine), content.names.suite(suite), shown(dataset), shown(speed.reference))
+                about: tuple[str, ...] = (
+                    sentence(machine),
+                    content.names.suite(suite),
+                    shown(dataset),
+                    shown(speed.reference),
+                )
+                about += (WORDS[speed.timed],)
                 times = (
                     Cell(ratio, key=f"{speed.ratio:.6g}"),
                     Cell(number(speed.p50_us, 0)),
                     Cell(str(speed.captures)),
                 )
                 rows.append((*map(Cell, about), *times))
-    columns = ("machine", "suite", "dataset", "reference", "time ratio", "median of a frame (us)", "timed captures (n)")
-    return Table("On each machine", columns, tuple(rows))
+    columns = ("machine", "suite", "dataset", "reference", "times are", "time ratio", "median of a frame (us)")
+    return Table("On each machine", (*columns, "timed captures (n)"), tuple(rows))
 
 
 def _failures(mine: list[tuple[Suite, Contender]]) -> Table:
