@@ -145,7 +145,7 @@ def _print(about: dict[str, Any], latencies: Sequence[tuple[str, Latency]], *, b
         render.print_table(title, ("", *names), rows)
 
     reference = _reference(all_latencies[0])["reference"]
-    table(f"time from samples to rows relative to {reference}, in alternating blocks", _RATIOS)
+    table(f"time relative to {reference}, samples to rows, in alternating blocks", _RATIOS)
     machine = all_latencies[0].machine
     versions = ", ".join(f"{name} {version}" for name, version in machine["versions"].items())
     table(f"THIS MACHINE ONLY ({machine['cpu']}, {machine['cores']} cores; {versions})", _TIMES)

@@ -1,11 +1,12 @@
 """What the timed loops hand to a detector."""
 
+import dataclasses
 import gc
 
 import numpy as np
 import pytest
 
-from uwbbench.api import Capture, Detections
+from uwbbench.api import Capture, Detections, Frames, analytic
 from uwbbench.detect.pipeline import detector_from_yaml, load_detector
 from uwbbench.measure.latency import loops
 from uwbbench.measure.latency.received import received
@@ -45,6 +46,24 @@ def test_a_second_pass_profits_nothing_from_the_first(approach: Capture) -> None
         stream = Counting()
         loops.timed_calls(stream, frames, 0, 10)  # type: ignore[arg-type]
         assert stream.fresh
+
+
+def test_real_samples_become_analytic_inside_the_call(approach: Capture) -> None:
+    radar = dataclasses.replace(approach.radar, samples="rf", has_sts=False, has_first_path=False)
+    none = dict.fromkeys(("sts1", "sts2", "first_path_index", "first_path_index_sts1", "first_path_index_sts2"))
+    real = np.real(approach.preamble[:]).copy()
+    capture = dataclasses.replace(approach, radar=radar, preamble=real, **none)  # type: ignore[arg-type]
+    frames = received(capture, 8)
+    assert not np.iscomplexobj(frames.preamble)  # what is in memory before the clock starts
+    stepped: list[np.ndarray] = []
+
+    class Keeping(Counting):
+        def step(self, block: Frames) -> Detections:  # type: ignore[override]
+            stepped.append(block.preamble)
+            return super().step(block)
+
+    loops.timed_calls(Keeping(), frames, 0, 8)  # type: ignore[arg-type]
+    np.testing.assert_array_equal(np.concatenate(stepped), analytic(real[:8]))
 
 
 def test_the_step_is_a_part_of_the_way_from_samples_to_rows(approach: Capture) -> None:

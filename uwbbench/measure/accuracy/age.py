@@ -6,9 +6,10 @@ Conventions
   was handed out. A detector declares nothing.
 * The *answer about a frame* is all detections of that frame. It has been given once any of them was handed out; those
   of them that come later join it then.
-* A frame without detections is answered too, by "nothing there", from the step on that first named it as processed;
-  but only if no detection of an earlier frame was still held back then. While something is held back, nobody can
-  distinguish "nothing there" from "nothing yet".
+* A frame without detections is answered too, by "nothing there", from the step on that first named it as processed.
+  That needs a detector that hands out the detections of a frame when it names the frame. One that names frames as
+  processed and hands out detections of them later (on this capture at least once) cannot say "nothing there", as nobody
+  can distinguish it from "nothing yet": its empty frames are no answers.
 * The *latest answer* at the moment of a frame is the answer about the newest frame that has been given by then, after
   the step of that very frame. It is taken as it is, not extrapolated: its ranges and positions are held against the
   truth of the moment. A detector that has not answered yet has found nothing at that moment.
@@ -25,8 +26,6 @@ import numpy as np
 from uwbbench.api.arrays import FloatArray, IntArray
 from uwbbench.api.detections import HANDED_OUT, Detections
 from uwbbench.api.errors import ScoringError
-
-NEVER = np.iinfo(np.int64).max
 
 
 def latest_answers(found: Detections) -> Detections:
@@ -48,6 +47,8 @@ def latest_answers(found: Detections) -> Detections:
             "it is not known when these detections were handed out; take them from "
             "detector.run(capture, handed_out=True), or run the experiment anew where an earlier version made it"
         )
+    if not len(answered):
+        return found.take(np.zeros(len(found), np.bool_))
     found = found.take(np.argsort(found.frame, kind="stable"))
     moments = found.processed
     newest = _newest_answered(found, answered)
@@ -64,11 +65,12 @@ def _newest_answered(found: Detections, answered: IntArray) -> IntArray:
     handed_out = found[HANDED_OUT]
     filled, first_row = np.unique(found.frame, return_index=True)
     given = np.minimum.reduceat(handed_out, first_row) if len(filled) else np.empty(0, np.int64)
-    empty = ~np.isin(found.processed, filled)
-    bare, named = found.processed[empty], answered[empty]
-    held_until = np.concatenate([[-1], np.maximum.accumulate(handed_out)])[np.searchsorted(found.frame, bare)]
-    told = np.where(held_until <= named, named, NEVER)
-    frame, given = np.concatenate([filled, bare]), np.concatenate([given, told])
+    frame = filled
+    place = np.minimum(np.searchsorted(found.processed, found.frame), len(answered) - 1)
+    if np.all(handed_out <= answered[place]):
+        bare = ~np.isin(found.processed, filled)
+        frame = np.concatenate([filled, found.processed[bare]])
+        given = np.concatenate([given, answered[bare]])
     order = np.argsort(given, kind="stable")
     newest = np.concatenate([[-1], np.maximum.accumulate(frame[order])])
     return np.asarray(newest[np.searchsorted(given[order], found.processed, side="right")])

@@ -25,6 +25,7 @@ from uwbbench.measure.accuracy.stats import Difference, evaluate, holm, paired_d
 from uwbbench.results.comparison.units import Unit
 from uwbbench.results.pareto import NORMAL_975, Speed, speeds_of_run
 from uwbbench.results.slices import Board
+from uwbbench.results.times import WORDS
 from uwbbench.run.folder.folder import RunFolder
 
 
@@ -144,7 +145,8 @@ def time_changes(first: RunFolder, second: RunFolder) -> tuple[list[TimeChange],
         if after is None:
             continue
         if before.timed != after.timed:
-            missing[f"times not compared: one run timed {before.timed}, the other {after.timed}"] = None
+            kinds = WORDS[before.timed], WORDS[after.timed]
+            missing[f"times not compared: those of the first run are {kinds[0]}, of the second {kinds[1]}"] = None
             continue
         if before.reference != after.reference or identities[0] != identities[1]:
             missing["times not compared: the references differ"] = None
