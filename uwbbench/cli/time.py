@@ -149,7 +149,7 @@ def _print(about: dict[str, Any], latencies: Sequence[tuple[str, Latency]], *, b
     machine = all_latencies[0].machine
     versions = ", ".join(f"{name} {version}" for name, version in machine["versions"].items())
     table(f"THIS MACHINE ONLY ({machine['cpu']}, {machine['cores']} cores; {versions})", _TIMES)
-    table("age of the answers, from the arrival of a frame", _AGES)
+    table("age of the answers", _AGES)
     if about["paced_s"] is not None:
         paced = all_latencies[0].paced or {}
         table(f"at {paced['rate_hz']:g} Hz for {about['paced_s']:g} s, asleep in between, THIS MACHINE ONLY", _PACED)
