@@ -63,7 +63,7 @@ def score(
 
 
 def _latency_us(path: Path, opened: Capture, pipeline: Pipeline) -> dict[str, Any]:
-    """Times in microseconds, measured in a fresh process, and the number of calls behind them."""
+    """Times in microseconds, measured in a fresh process, the number of calls behind them, and the age of answers."""
     from uwbbench.config.source import CaptureRef
     from uwbbench.measure.latency import measure
     from uwbbench.measure.latency.settings import LatencyModel
@@ -73,7 +73,8 @@ def _latency_us(path: Path, opened: Capture, pipeline: Pipeline) -> dict[str, An
         CaptureRef.of_file(path, receiver), pipeline.config, LatencyModel.model_validate({"reference": None})
     ).to_dict()
     times = {key.removesuffix("_us"): value for key, value in measured.items() if key.endswith("_us")}
-    return {"n": measured["n"], **times}
+    step = {f"step_{name.removesuffix('_us')}": value for name, value in (measured["step"] or {}).items()}
+    return {"n": measured["n"], **times, **step, "age": measured["age"]}
 
 
 def _open(path: Path, receiver: str | None, detector: str, settings: list[str] | None) -> tuple[Capture, Pipeline]:

@@ -74,12 +74,12 @@ def print_scores(result: Mapping[str, Any]) -> None:
         typer.echo("after mapping: n/a (the detector does not cluster positions)")
     times = result["latency_us"]
     if times is not None:
-        shown = [f"{key} {number(times[key], 1, 1.0, 'us', 'too few calls')}" for key in _TIMES]
+        shown = [f"{key.replace('_', ' ')} {number(times[key], 1, 1.0, 'us', 'too few calls')}" for key in _TIMES]
         typer.echo(f"time a frame from samples to rows, one frame a call ({times['n']} calls): {', '.join(shown)}")
     print_notes(result["notes"])
 
 
-_TIMES = ("p50", "p90", "p95", "p99", "amortised", "deadline")
+_TIMES = ("p50", "p90", "p95", "p99", "amortised", "deadline", "step_p50")
 
 
 def _scores(blocks: Sequence[Mapping[str, Any]]) -> Iterator[tuple[str, list[str]]]:

@@ -120,8 +120,12 @@ def speed_of(timed: Sequence[Entry]) -> Speed | None:
 
 def speeds_of_run(entries: Iterable[Entry]) -> dict[tuple[str, str], Speed]:
     """Speed by dataset and detector, from all entries of a run; without those that were never compared."""
+    datasets: dict[str, list[Entry]] = defaultdict(list)
     timed: dict[tuple[str, str], list[Entry]] = defaultdict(list)
-    for entry in comparable(e for e in entries if (e.kind, e.status) == ("latency", "done")):
+    for entry in entries:
+        if (entry.kind, entry.status) == ("latency", "done"):
+            datasets[entry.dataset].append(entry)
+    for entry in (entry for units in datasets.values() for entry in comparable(units)):
         timed[entry.dataset, entry.detector].append(entry)
     speeds = {key: speed_of(units) for key, units in timed.items()}
     return {key: speed for key, speed in speeds.items() if speed is not None}
