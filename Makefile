@@ -11,12 +11,18 @@ $(VENV)/ready: pyproject.toml
 	$(BIN)/python -m pip install --quiet --editable ".[test,lint,docs]"
 	touch $@
 
+# Tests start many processes, which need not compile what they import each time anew: bytecode is kept.
+test test-slow: export PYTHONDONTWRITEBYTECODE =
+
+# The files in their order, not those of the most tests first: those of few tests are often the longest.
+PYTEST := $(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder
+
 test: $(VENV)/ready
-	$(BIN)/python -m pytest -n 2 --dist loadfile -m "not slow and not browser"
+	$(PYTEST) -m "not slow and not browser"
 
 # What takes longer: pages in a real browser, examples of the documentation, packages installed by pip.
 test-slow: $(VENV)/ready
-	$(BIN)/python -m pytest -n 2 --dist loadfile -m "slow or browser"
+	$(PYTEST) -m "slow or browser"
 
 lint: $(VENV)/ready
 	$(BIN)/ruff format --check .

@@ -12,7 +12,12 @@ from tests.fixtures.chance import SHIFT, seed
 from uwbbench.api import Capture, registry
 from uwbbench.api.registry import load_plugin
 
-pytest_plugins = ["tests.fixtures.shared", "tests.fixtures.runs", "tests.fixtures.contributions"]
+pytest_plugins = [
+    "tests.fixtures.shared",
+    "tests.fixtures.compiling",
+    "tests.fixtures.runs",
+    "tests.fixtures.contributions",
+]
 
 # The same examples on every machine, however slow; others, and more of them, come with another seed.
 settings.register_profile("usual", derandomize=SHIFT == 0, max_examples=40 if SHIFT == 0 else 100, deadline=None)

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from uwbbench.api.capture_file import open_capture, write_capture
     from uwbbench.api.registry import register
     from uwbbench.detect.pipeline import detector_from_yaml, load_detector
+    from uwbbench.detect.results_file import read_results
     from uwbbench.measure.accuracy.scoring import score
     from uwbbench.measure.calibration import calibrate
     from uwbbench.tools.library import compare, gate, leaderboard, open_dataset, open_run, plot, run, tune
@@ -41,6 +42,7 @@ __all__ = [
     "open_dataset",
     "open_run",
     "plot",
+    "read_results",
     "register",
     "run",
     "score",
@@ -56,6 +58,7 @@ _HOME = {
     "calibrate": "uwbbench.measure.calibration",
     "detector_from_yaml": "uwbbench.detect.pipeline",
     "load_detector": "uwbbench.detect.pipeline",
+    "read_results": "uwbbench.detect.results_file",
     "score": "uwbbench.measure.accuracy.scoring",
     "Run": "uwbbench.tools.stored_run",
     **dict.fromkeys(("compare", "gate", "leaderboard", "open_dataset", "open_run", "plot", "tune"), _LIBRARY),

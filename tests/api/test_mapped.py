@@ -1,6 +1,5 @@
 """Reading a file of samples in bounded memory."""
 
-import sys
 import tracemalloc
 from pathlib import Path
 
@@ -80,7 +79,7 @@ def test_opening_a_long_file_allocates_no_samples(long_file: Path) -> None:
     tracemalloc.start()
     try:
         capture = open_capture(long_file)
-        poses = sum(sys.getsizeof(array) for array in vars(capture.trajectory).values())
+        poses = sum(array.nbytes for array in vars(capture.trajectory).values())
         assert tracemalloc.get_traced_memory()[1] < poses + 6 * MEGABYTE
     finally:
         tracemalloc.stop()

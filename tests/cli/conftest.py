@@ -1,17 +1,21 @@
 """What the tests of the command line share: a way to call it, and small capture and detector files."""
 
+import contextlib
 import dataclasses
+import shutil
 import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
 
-import click.testing
+import click
 import numpy as np
 import pytest
-from typer.testing import CliRunner
+import typer.main
+from click.testing import CliRunner, Result
 
 from tests.fixtures.chance import seed
+from tests.fixtures.shared import Once
 from uwbbench.api import Capture, Trajectory, write_capture
 from uwbbench.api.registry import load_plugin
 from uwbbench.cli import app
@@ -29,17 +33,23 @@ pipeline:
   - {use: range}
 """
 
-Call = Callable[..., click.testing.Result]
+Call = Callable[..., Result]
+
+
+@pytest.fixture(scope="session")
+def program() -> click.Command:
+    """The command line, put together once."""
+    return typer.main.get_command(app)
 
 
 @pytest.fixture
-def uwbbench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Call:
+def uwbbench(program: click.Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Call:
     """Call the command line inside an empty folder."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.delenv("UWBBENCH_DATA", raising=False)
 
     def call(*words: object, code: int = 0) -> click.testing.Result:
-        result = CliRunner().invoke(app, [str(word) for word in words], prog_name="uwbbench")
+        result = CliRunner().invoke(program, [str(word) for word in words], prog_name="uwbbench")
         crashed = result.exception is not None and not isinstance(result.exception, SystemExit)
         assert not crashed, f"traceback: {result.exception!r}"
         assert result.exit_code == code, f"exit code {result.exit_code}: {result.output}"
@@ -69,6 +79,31 @@ def small_approach(**changes: object) -> Capture:
     return dataset.open(dataset.names()[0])
 
 
+@pytest.fixture(scope="session")
+def small_capture(once: Once) -> Path:
+    """A capture file with truth, to be copied."""
+    return once("cli-capture", lambda folder: write_capture(folder / "run.h5", small_approach())) / "run.h5"
+
+
+@pytest.fixture(scope="session")
+def ran(once: Once, program: click.Command, small_capture: Path) -> Callable[..., Path]:
+    """Run an experiment on the small capture: ``ran(name, experiment)`` is the folder of its files and the run."""
+
+    def run(name: str, experiment: str, detector: str = SIMPLE_DETECTOR) -> Path:
+        def make(folder: Path) -> None:
+            shutil.copy(small_capture, folder / "run.h5")
+            (folder / "simple.yaml").write_text(detector)
+            (folder / "small.yaml").write_text(experiment)
+            with contextlib.chdir(folder):
+                words = ["run", "small.yaml", "--jobs", "1", "--out", name, "--quiet"]
+                result = CliRunner().invoke(program, words, prog_name="uwbbench")
+            assert result.exit_code == 0, result.output
+
+        return once(f"cli-{name}", make)
+
+    return run
+
+
 @pytest.fixture
 def detector(tmp_path: Path) -> Path:
     """A small detector file."""
@@ -78,10 +113,9 @@ def detector(tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def capture(tmp_path: Path) -> Path:
+def capture(small_capture: Path, tmp_path: Path) -> Path:
     """A capture file with truth."""
-    write_capture(tmp_path / "run.h5", small_approach())
-    return tmp_path / "run.h5"
+    return Path(shutil.copy(small_capture, tmp_path / "run.h5"))
 
 
 @pytest.fixture

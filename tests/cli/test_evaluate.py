@@ -119,6 +119,39 @@ def test_score_json_is_pure_in_a_real_process(
     assert json.loads(done.stdout)["filtering"]["retained"] > 0
 
 
+def test_a_results_file_is_scored_as_what_the_detector_found(uwbbench, capture: Path, tmp_path: Path) -> None:
+    uwbbench("detect", capture, "-d", "paper", "-o", tmp_path / "found.csv")
+    (tmp_path / "found.frames.csv").write_text("frame,time_us\n" + "".join(f"{frame},25\n" for frame in range(39)))
+    read = json.loads(uwbbench("score", capture, "--results", tmp_path / "found.csv", "--json").stdout)
+    run = json.loads(uwbbench("score", capture, "-d", "paper", "--no-latency", "--json").stdout)
+    assert (read["filtering"], read["mapping"]) == (run["filtering"], run["mapping"])
+    assert (read["detector"], read["results_file"]) == ("found", str(tmp_path / "found.csv"))
+    assert (read["latency_us"]["n"], read["latency_us"]["p50"], read["latency_us"]["as_reported"]) == (39, 25, True)
+    shown = uwbbench("score", capture, "--results", tmp_path / "found.csv").stdout
+    assert "found (results file) on SIMULATED capture" in shown
+    assert "time a frame, as the file reports it (39 frames): p50 25.0 us" in shown
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        ([], "give either --detector"),
+        (["--results", "found.csv", "-d", "paper"], "give either --detector"),
+        (["--results", "found.csv", "--set", "x=1"], "--set changes a detector"),
+        (["--results", "found.csv"], "found.csv: line 2: range_m 250: metres?"),
+        (["--results", "gone.csv"], "gone.csv: cannot be read"),
+    ],
+)
+def test_a_results_file_that_makes_no_sense_is_a_usage_error(
+    uwbbench, capture: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, words: list[str], says: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "found.csv").write_text("frame,range_m\n0,250\n")
+    result = uwbbench("score", capture, *words, code=2)
+    assert says in result.stderr
+    assert "Traceback" not in result.stderr
+
+
 # detect
 
 

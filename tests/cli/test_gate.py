@@ -16,13 +16,16 @@ from uwbbench.run.experiment import read_experiment
 ONCE = "{maximum_ratio: 3, frames: 100, blocks: 31, patience: 1, warmup_windows: 2, processes: 3}"
 """Latency with a limit that no machine reaches by chance."""
 
+PLATE = "{use: approach, name: plate}"
+"""The gate's simulated capture."""
+
 
 @pytest.fixture
 def make_gate(tmp_path: Path):
     """Write a gate file on a simulated capture."""
 
     def make(name: str = "gate.yaml", **keys: object) -> Path:
-        lines = {"schema": 1, "head": "paper-filtering", "datasets": "[{use: approach, name: plate}]", **keys}
+        lines = {"schema": 1, "head": "paper-filtering", "datasets": f"[{PLATE}]", **keys}
         path = tmp_path / name
         path.write_text("".join(f"{key}: {value}\n" for key, value in lines.items() if value is not None), "utf-8")
         return path
@@ -47,9 +50,7 @@ def stages(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
 def stored_run(tmp_path: Path) -> Path:
     """A run of ``paper-filtering`` on the gate's captures."""
     file = tmp_path / "stored.yaml"
-    file.write_text(
-        "schema: 1\ndetectors: [paper-filtering]\ndatasets: [{use: approach}]\nlatency: false\nstability: false\n"
-    )
+    file.write_text(f"schema: 1\ndetectors: [paper-filtering]\nlatency: false\nstability: false\ndatasets: [{PLATE}]\n")
     return run_experiment(read_experiment(file), tmp_path / "stored", jobs=1).path
 
 

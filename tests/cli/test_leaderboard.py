@@ -6,6 +6,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.cli.conftest import SIMPLE_DETECTOR
+
 EXPERIMENT = """\
 schema: 1
 name: small
@@ -20,19 +22,17 @@ intervals: {resamples: 100}
 
 
 @pytest.fixture
-def before(uwbbench, tmp_path: Path, capture: Path, detector: Path) -> Path:
-    """A run of two detectors."""
-    (tmp_path / "small.yaml").write_text(EXPERIMENT)
-    uwbbench("run", "small.yaml", "--out", "before", "--jobs", 1, "--quiet")
+def before(ran, tmp_path: Path) -> Path:
+    """A run of two detectors, beside their capture."""
+    shutil.copytree(ran("before", EXPERIMENT), tmp_path, dirs_exist_ok=True)
     return tmp_path / "before"
 
 
 @pytest.fixture
-def after(uwbbench, before: Path, tmp_path: Path, detector: Path) -> Path:
+def after(ran, before: Path) -> Path:
     """The same with a detector that guards more taps, and so misses what is near."""
-    detector.write_text(detector.read_text().replace("guard_taps: 6", "guard_taps: 14"))
-    uwbbench("run", "small.yaml", "--out", "after", "--jobs", 1, "--quiet")
-    return tmp_path / "after"
+    deaf = SIMPLE_DETECTOR.replace("guard_taps: 6", "guard_taps: 14")
+    return Path(shutil.copytree(ran("after", EXPERIMENT, deaf) / "after", before.parent / "after"))
 
 
 def test_verify_says_what_was_checked(uwbbench, before: Path) -> None:
@@ -122,8 +122,8 @@ def test_diff_tells_what_went_in_then_scores_then_frames(uwbbench, before: Path,
     uwbbench("diff", "before", "after", "--exit-code", code=1)
 
 
-def test_diff_draws_without_the_capture_and_says_so(uwbbench, before: Path, after: Path, capture: Path) -> None:
-    capture.unlink()
+def test_diff_draws_without_the_capture_and_says_so(uwbbench, before: Path, after: Path) -> None:
+    (before.parent / "run.h5").unlink()
     found = uwbbench("diff", "before", "after", "--figure", "worst.svg", "--scoring", "object")
     assert "the response is not shown" in found.stderr
     assert (before.parent / "worst.svg").is_file()

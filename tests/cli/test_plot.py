@@ -14,11 +14,10 @@ stability: false
 """
 
 
-@pytest.fixture
-def run(uwbbench, tmp_path):
-    (tmp_path / "tiny.yaml").write_text(TINY_RUN)
-    uwbbench("run", "tiny.yaml", "--out", "done", "--jobs", 1, "--quiet")
-    return tmp_path / "done"
+@pytest.fixture(scope="session")
+def run(ran):
+    """A run folder; nothing that is drawn changes it."""
+    return ran("tiny", TINY_RUN) / "tiny"
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -20,10 +20,9 @@ intervals: {resamples: 100}
 
 
 @pytest.fixture
-def run(uwbbench, capture: Path, detector: Path, tmp_path: Path) -> Path:
-    """A run folder."""
-    (tmp_path / "small.yaml").write_text(EXPERIMENT)
-    uwbbench("run", "small.yaml", "--jobs", 1, "--out", "run")
+def run(ran, tmp_path: Path) -> Path:
+    """A run folder, beside its capture."""
+    shutil.copytree(ran("run", EXPERIMENT), tmp_path, dirs_exist_ok=True)
     return tmp_path / "run"
 
 
@@ -76,8 +75,8 @@ def test_a_report_does_not_change_the_run(uwbbench, run: Path, tmp_path: Path) -
     assert {path: path.read_bytes() for path in run.rglob("*") if path.is_file()} == before
 
 
-def test_samples_that_are_gone_are_said_to_be(uwbbench, run: Path, capture: Path, tmp_path: Path) -> None:
-    capture.unlink()
+def test_samples_that_are_gone_are_said_to_be(uwbbench, run: Path, tmp_path: Path) -> None:
+    (tmp_path / "run.h5").unlink()
     uwbbench("report", "run", "-o", "a.html")
     assert "Capture not at hand" in (tmp_path / "a.html").read_text()
 

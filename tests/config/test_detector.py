@@ -157,3 +157,16 @@ def test_a_channel_without_value_is_refused():
 def test_a_wrong_value_for_any_channel_is_found_when_the_file_is_read(params, message):
     with pytest.raises(ConfigError, match=message):
         detector_from_text(text_of(params), "d.yaml")
+
+
+def test_a_detector_names_the_column_that_orders_its_candidates():
+    changed = read_detector("paper-filtering", changes={"score": "prominence"})
+    assert changed.score == changed.to_dict()["score"] == "prominence"
+    plain = read_detector("paper-filtering")
+    assert plain.score == ""
+    assert "score" not in plain.to_dict()
+
+
+def test_a_score_that_no_step_makes_is_refused_with_the_nearest_column():
+    with pytest.raises(ConfigError, match=r"score: no step makes the column 'prominense'.*'prominence'"):
+        read_detector("paper-filtering", changes={"score": "prominense"})

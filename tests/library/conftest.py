@@ -10,7 +10,7 @@ from tests.fixtures.shared import Once
 
 SMALL = {
     "name": "small",
-    "detectors": ["paper", "cfar-os"],
+    "detectors": ["paper", "paper-filtering"],
     "datasets": [{"use": "approach", "name": "plates", "params": {"speed_m_s": 3.0, "runs": 3}}],
     "scoring": "frame",
     "latency": {"frames": 20, "blocks": 8},

@@ -35,7 +35,7 @@ def test_a_comparison_by_a_scoring_that_the_run_has_not_is_refused(made):
 def test_a_leaderboard_has_a_row_a_board_and_version_of_a_detector(made, cautious):
     table = uwbbench.leaderboard([made, cautious.path]).table
     board = table[table["table"] == "filtering"]
-    assert sorted(board["detector"]) == ["cfar-os", "paper", "paper"]
+    assert sorted(board["detector"]) == ["paper", "paper", "paper-filtering"]
     assert board["identity"].nunique() == 3
     assert board["time_ratio"].notna().sum() == 2
 

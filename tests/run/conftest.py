@@ -42,6 +42,33 @@ class Wait(Stage[FileParams]):
             time.sleep(0.05)
         return block.replace(detections=Detections.empty())
 
+class HowParams(Params):
+    how: str = "SystemExit(0)"
+
+class End(Stage[HowParams]):
+    """Asks the program to end."""
+    produces = ports("detections")
+    def step(self, block):
+        raise {
+            "exit": SystemExit(0),
+            "interrupt": KeyboardInterrupt(),
+            "close": GeneratorExit(),
+            "other": BaseException("of no known kind"),
+        }[self.params.how]
+
+class Write(Stage[HowParams]):
+    """Writes into what it is handed."""
+    needs = frozenset({"truth", "sts"})
+    produces = ports("detections")
+    def show_truth(self, truth, trajectory):
+        self.shown = {"outline_m": truth.objects[0].outline_m, "track_m": trajectory.position_m}
+    def step(self, block):
+        values = self.shown.get(self.params.how)
+        if values is None:
+            values = getattr(block.frames, self.params.how)
+        values[:] = 0
+        return block.replace(detections=Detections.empty())
+
 class NoListing(Dataset[Params]):
     """Cannot say what it holds."""
     card = Card(title="t", license="l", citation="c", source="s")
@@ -54,6 +81,8 @@ ENTRY_POINTS = """\
 misbehaving.crash = misbehaving:Crash
 misbehaving.raise = misbehaving:Raise
 misbehaving.wait = misbehaving:Wait
+misbehaving.end = misbehaving:End
+misbehaving.write = misbehaving:Write
 [uwbbench.datasets]
 misbehaving.listing = misbehaving:NoListing
 """

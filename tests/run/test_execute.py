@@ -15,6 +15,7 @@ from uwbbench.measure.accuracy.scoring import Region, ScoringRules, score
 from uwbbench.run import Progress, rescore, run_experiment
 from uwbbench.run.experiment import Experiment
 from uwbbench.run.folder import RunFolder
+from uwbbench.run.folder.scored import causes_of
 
 MakeExperiment = Callable[..., Experiment]
 DetectorFile = Callable[..., Path]
@@ -180,8 +181,24 @@ def test_scoring_again_with_other_rules_is_scoring_with_those_rules(
     rules = [ScoringRules("frame", 0.03, Region(0.6, 2.0))]
     assert folder.scores()["tp"].iloc[0] != strict.scores()["tp"].iloc[0]
     rescore(folder, rules)
-    pd.testing.assert_frame_equal(folder.scores(), strict.scores())
+    pd.testing.assert_frame_equal(folder.scores().drop(columns="causes"), strict.scores().drop(columns="causes"))
     assert folder.rules == rules
+
+
+def test_causes_of_misses_are_kept_under_the_same_rules_and_not_known_under_others(
+    make_experiment: MakeExperiment, tmp_path: Path
+) -> None:
+    folder = run_experiment(make_experiment("[paper-filtering]", scoring="object"), tmp_path / "run", jobs=1)
+    before = folder.scores()["causes"].tolist()
+    rule = folder.rules[0]
+    rescore(folder)
+    assert folder.scores()["causes"].tolist() == before
+    assert folder.curve(folder.entries()[0].unit, rule) is not None
+    other = dataclasses.replace(rule, gate_m=0.03)
+    rescore(folder, [other])
+    misses = [causes_of(row).misses for row in folder.scores().to_dict("records")]
+    assert {cause for causes in misses for cause in causes} == {"not known"}
+    assert folder.curve(folder.entries()[0].unit, other) is None
 
 
 def test_peak_scoring_of_a_run_without_candidates_is_a_row_with_the_reason(

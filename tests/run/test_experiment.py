@@ -87,6 +87,14 @@ def test_half_angles_are_written_in_degrees(tmp_path: Path) -> None:
     assert found.region.half_angle_rad == pytest.approx(math.pi / 6)
 
 
+def test_metrics_are_a_list_or_say_exactly_where_each_is_shown(tmp_path: Path) -> None:
+    listed = read_experiment(written(tmp_path, SMALL + "metrics: [bias, bias]\n"))
+    assert listed.metrics == ("bias",)
+    assert listed.to_dict()["metrics"] == ["bias"]
+    exact = read_experiment(written(tmp_path, SMALL + "metrics: {rank: mae, charts: [mae, f1]}\n"))
+    assert exact.metrics == exact.to_dict()["metrics"] == {"rank": "mae", "charts": ["mae", "f1"]}
+
+
 @pytest.mark.parametrize(
     ("change", "says"),
     [
@@ -102,6 +110,12 @@ def test_half_angles_are_written_in_degrees(tmp_path: Path) -> None:
         (("schema: 1", "schema: 2"), r"mine\.yaml:1: schema"),
         (("schema: 1", "schema: 1\nscoring: [frame, objekt]"), r"mine\.yaml:2: scoring\[1\]"),
         (("schema: 1", "schema: 1\nmetrics: [mea]"), r"mine\.yaml:2: .*Did you mean 'mae'"),
+        (("schema: 1", "schema: 1\nmetrics: {rank: mea}"), r"mine\.yaml:2: metrics\.rank: .*Did you mean 'mae'"),
+        (("schema: 1", "schema: 1\nmetrics: {table: [f1, p59]}"), r"mine\.yaml:2: metrics\.table\[1\]: .*'p95'"),
+        (("schema: 1", "schema: 1\nmetrics: {rank: bias}"), r"metrics\.rank: .*'bias' has no better end"),
+        (("schema: 1", "schema: 1\nmetrics: {ranks: f1}"), r"mine\.yaml:2: metrics\.ranks: .*Did you mean 'rank'"),
+        (("schema: 1", "schema: 1\nmetrics: {charts: []}"), r"mine\.yaml:2: metrics\.charts"),
+        (("schema: 1", "schema: 1\nmetrics: f1"), r"mine\.yaml:2: metrics: "),
         (("schema: 1", "schema: 1\ngate_m: .nan"), r"mine\.yaml:2: gate_m"),
         (("schema: 1", "schema: 1\nset: {gate_m: 1}"), r"mine\.yaml:2: .*'extends' is missing"),
         (("schema: 1", "schema: 1\nextends: nowhere"), r"mine\.yaml:2: extends: no experiment named 'nowhere'"),

@@ -12,7 +12,7 @@ from typing import Any, Literal, Protocol, runtime_checkable
 
 import numpy as np
 
-from uwbbench.api.arrays import BoolArray, ComplexArray, FloatArray
+from uwbbench.api.arrays import BoolArray, ComplexArray, FloatArray, lock_fields, locked
 from uwbbench.api.errors import CaptureError
 from uwbbench.api.frames import Frames
 from uwbbench.api.radar import Radar
@@ -120,6 +120,8 @@ _PER_FRAME = (
 class Capture(CaptureHeader):
     """One run of one receiver.
 
+    Its arrays, and those of the frames that it hands out, cannot be written to: detectors share them.
+
     Attributes
     ----------
     preamble : (frames, taps) samples
@@ -143,6 +145,7 @@ class Capture(CaptureHeader):
     receivers: tuple[str, ...] = field(default=())
 
     def __post_init__(self) -> None:
+        lock_fields(self, ("preamble", "sts1", "sts2", *_PER_FRAME))
         if len(self.preamble.shape) != 2:
             raise CaptureError(f"capture '{self.name}': samples have shape (frames, taps), not {self.preamble.shape}")
         frames, taps = self.preamble.shape
@@ -213,18 +216,18 @@ class Capture(CaptureHeader):
                 raw = analytic(raw)
         extra: dict[str, Any] = {}
         for name in ("sts1", "sts2") if sts and self.sts1 is not None else ():
-            extra[name] = self._rows(name, start, stop)
+            extra[name] = locked(self._rows(name, start, stop))
             valid = valid & _finite_frames(extra[name])
         for name in _PER_FRAME:
             if getattr(self, name) is not None:
                 extra[name] = getattr(self, name)[start:stop]
         return Frames(
             first=start,
-            preamble=raw,
+            preamble=locked(raw),
             timestamp_s=self.trajectory.timestamp_s[start:stop],
             position_m=self.trajectory.position_m[start:stop],
             yaw_rad=self.trajectory.yaw_rad[start:stop],
-            valid=valid,
+            valid=locked(valid),
             **extra,
         )
 

@@ -15,6 +15,7 @@ from types import ModuleType
 from typing import Any, Literal, Self, TypeVar, get_args
 
 from uwbbench.api.errors import ConfigError, UwbbenchError, nearest
+from uwbbench.api.interruption import by_plugin
 from uwbbench.api.text import summary
 
 Expectation = Literal["reject", "survive", "equal"]
@@ -153,11 +154,13 @@ class Check:
             return CheckResult(
                 self, "failed", expected=fault.expected or self.asked, found=fault.found, flips=fault.flips
             )
-        except Exception as error:  # noqa: BLE001 - a plugin may raise anything
+        except BaseException as error:
+            if not by_plugin(error):
+                raise
             return self._broken(error)
         return CheckResult(self, "passed", **vars(seen if isinstance(seen, Evidence) else Evidence(seen or "")))
 
-    def _broken(self, error: Exception) -> CheckResult:
+    def _broken(self, error: BaseException) -> CheckResult:
         trace = "".join(traceback.format_exception(error))
         return CheckResult(self, "error", expected="no exception", found=last_line(error), trace=trace)
 
@@ -181,7 +184,7 @@ class HardCase(Check):
         """The expectation, and the behaviour in one sentence; the docstring goes on to argue it."""
         return f"{self.expectation}: {self.statement}"
 
-    def _broken(self, error: Exception) -> CheckResult:
+    def _broken(self, error: BaseException) -> CheckResult:
         return CheckResult(self, "failed", expected=self.asked, found=f"{type(error).__name__}: {error}")
 
 

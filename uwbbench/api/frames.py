@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from uwbbench.api.arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from uwbbench.api.arrays import BoolArray, ComplexArray, FloatArray, IntArray, locked
 
 
 def magnitude(samples: ComplexArray) -> FloatArray:
@@ -77,7 +77,7 @@ class Frames:
     @cached_property
     def amplitude(self) -> FloatArray:
         """Magnitudes (frames, taps) of the preamble response."""
-        return magnitude(self.preamble)
+        return locked(magnitude(self.preamble))
 
     def with_preamble(self, preamble: ComplexArray) -> Frames:
         """Return the same frames with other samples, for example after clutter removal."""
@@ -89,7 +89,9 @@ class Frames:
             return self
         samples = {name: getattr(self, name) for name in ("preamble", "sts1", "sts2")}
         cleared: dict[str, Any] = {
-            name: np.where(self.valid[:, None], values, 0) for name, values in samples.items() if values is not None
+            name: locked(np.where(self.valid[:, None], values, 0))
+            for name, values in samples.items()
+            if values is not None
         }
         return dataclasses.replace(self, **cleared)
 

@@ -8,14 +8,14 @@ from typing import ClassVar, Literal, TypeVar
 
 import numpy as np
 
-from uwbbench.api.arrays import BoolArray, FloatArray, IntArray
+from uwbbench.api.arrays import BoolArray, FloatArray, IntArray, lock_fields
 
 _Value = TypeVar("_Value", float, FloatArray)
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """Result of matching one detector's output on one capture against the truth, in one scoring.
+    """Result of matching one detector's output on one capture against the truth, in one scoring; read-only.
 
     Attributes
     ----------
@@ -44,6 +44,9 @@ class Outcome:
     matched: BoolArray
     duration_s: float
     exhaustive: bool = True
+
+    def __post_init__(self) -> None:
+        lock_fields(self, ("group", "tp", "fp", "fn", "error_frame", "error_m", "matched"))
 
 
 class Metric:

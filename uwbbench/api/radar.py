@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from uwbbench.api.arrays import FloatArray
+from uwbbench.api.arrays import FloatArray, locked
 from uwbbench.api.errors import CaptureError
 from uwbbench.api.geometry import SPEED_OF_LIGHT_M_S, rotate_z
 
@@ -96,7 +96,7 @@ class Radar:
     def baseline_m(self) -> FloatArray:
         """Vector (3,) from receiver to transmitter in the receiver frame (x = boresight)."""
         offset = np.subtract(self.tx_position_m, self.mount_position_m).astype(float)
-        return rotate_z(offset, -self.mount_yaw_rad)
+        return locked(rotate_z(offset, -self.mount_yaw_rad))
 
     @property
     def baseline_length_m(self) -> float:

@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any, Literal, get_args
 
 from uwbbench.api.errors import PluginError, nearest
+from uwbbench.api.interruption import by_plugin
 
 ClassKind = Literal["stages", "datasets", "metrics", "terms", "kernels"]
 PluginKind = ClassKind | Literal["detectors"]
@@ -177,7 +178,9 @@ def load_object(kind: ClassKind | Literal["cases"], name: str) -> Any:
     module, _, attribute = registered.target.partition(":")
     try:
         return getattr(importlib.import_module(module), attribute)
-    except Exception as error:  # whatever a plugin's import raises is that plugin's fault alone
+    except BaseException as error:  # whatever a plugin's import raises is that plugin's fault alone
+        if not by_plugin(error):
+            raise
         cause = f"{type(error).__name__}: {error}"
         raise PluginError(
             f"{kind[:-1]} '{name}' of {registered.package} cannot be loaded from {registered.target}: {cause}"
@@ -196,7 +199,9 @@ def detector_file(name: str) -> Path:
     module, _, filename = registered.target.partition(":")
     try:
         spec = importlib.util.find_spec(module)
-    except Exception as error:  # finding a module imports the packages above it, which may raise anything
+    except BaseException as error:  # finding a module imports the packages above it, which may raise anything
+        if not by_plugin(error):
+            raise
         raise PluginError(f"detector '{name}' of {registered.package}: no package {module} ({error})") from error
     folders = list(spec.submodule_search_locations or []) if spec else []
     for folder in folders:

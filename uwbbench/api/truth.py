@@ -6,14 +6,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from uwbbench.api.arrays import BoolArray, FloatArray
+from uwbbench.api.arrays import BoolArray, FloatArray, lock_fields
 from uwbbench.api.geometry import nearest_on_outline, receiver_pose, rotate_z, segments_cross
 from uwbbench.api.radar import Radar
 
 
 @dataclass(frozen=True)
 class Trajectory:
-    """Where the robot was, frame by frame.
+    """Where the robot was, frame by frame; read-only.
 
     Attributes
     ----------
@@ -25,6 +25,9 @@ class Trajectory:
     timestamp_s: FloatArray
     position_m: FloatArray
     yaw_rad: FloatArray
+
+    def __post_init__(self) -> None:
+        lock_fields(self, ("timestamp_s", "position_m", "yaw_rad"))
 
     def __len__(self) -> int:
         return len(self.timestamp_s)
@@ -41,7 +44,7 @@ class Obstacle:
     material : str
     outline_m : (vertices, 2 or 3) or (frames, vertices, 2 or 3) array
         Closed polygon in the world; one vertex is a point target. With a leading frame axis the object moves, and
-        frames whose outline is NaN are unlabelled.
+        frames whose outline is NaN are unlabelled. Read-only.
     structure : bool
         True for walls and the like: seen and known, but no obstacle that a detector is asked to find.
     """
@@ -50,6 +53,9 @@ class Obstacle:
     material: str
     outline_m: FloatArray
     structure: bool = False
+
+    def __post_init__(self) -> None:
+        lock_fields(self, ("outline_m",))
 
     @property
     def moves(self) -> bool:

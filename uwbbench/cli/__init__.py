@@ -43,6 +43,9 @@ class _Commands(TyperGroup):
         except UwbbenchError as error:
             typer.echo(f"error: {error}", err=True)
             raise typer.Exit(USAGE_ERROR) from error
+        except SystemExit as stop:  # none of the commands ends so
+            typer.echo(f"error: a plugin has asked the program to end (SystemExit: {stop.code})", err=True)
+            raise typer.Exit(USAGE_ERROR) from stop
         except KeyboardInterrupt as stop:
             typer.echo("interrupted", err=True)
             raise typer.Exit(INTERRUPTED) from stop

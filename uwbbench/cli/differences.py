@@ -60,7 +60,7 @@ def _scores(comparison: Comparison) -> None:
             (
                 f"{shown(dataset)}, {source.upper()}",
                 f"{scoring}, {table}",
-                shown(change.detector),
+                comparison.label(change.detector),
                 by.axis,
                 number(change.before, by.digits, by.factor),
                 number(change.after, by.digits, by.factor),
@@ -94,7 +94,7 @@ def _times(comparison: Comparison) -> None:
 
 def _flips(comparison: Comparison, most: int) -> None:
     rows = [
-        (shown(detector), before, after, str(count))
+        (comparison.label(detector), before, after, str(count))
         for detector, counter in comparison.flip_counts.items()
         for (before, after), count in counter.most_common()
     ]
@@ -111,7 +111,8 @@ def _flips(comparison: Comparison, most: int) -> None:
 
 def _worst(comparison: Comparison, most: int) -> Iterator[tuple[str, ...]]:
     for flip in comparison.worst[:most]:
-        names = (shown(flip.unit.detector), shown(flip.unit.dataset), shown(flip.unit.capture))
+        unit = flip.unit
+        names = (comparison.label(unit.detector), shown(unit.dataset), shown(unit.capture))
         errors = [number(value, 1, 100) for value in (flip.error_before_m, flip.error_after_m)]
         yield (*names, str(flip.frame), f"{flip.time_s:.2f}", flip.before, flip.after, *errors)
 

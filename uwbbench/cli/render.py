@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from uwbbench.show.text.numbers import number
+from uwbbench.show.text.numbers import number, time_us
 
 if TYPE_CHECKING:
     from uwbbench.api.metric import Metric
@@ -64,8 +64,11 @@ def print_notes(notes: Sequence[str]) -> None:
 
 def print_scores(result: Mapping[str, Any]) -> None:
     """Print what ``score --json`` prints, for people: the two tables as columns, and the times."""
+    from uwbbench.config.detector import marked
+
     label = "SIMULATED capture" if result["source"] == "simulated" else "capture"
-    typer.echo(f"{result['detector']} on {label} '{result['capture']}', {result['frames']} frames")
+    name = marked(result["detector"], results_file=result["results_file"] is not None)
+    typer.echo(f"{name} on {label} '{result['capture']}', {result['frames']} frames")
     tables = [name for name in ("filtering", "mapping") if result[name] is not None]
     rows = [[title, *cells] for title, cells in _scores([result[name] for name in tables])]
     title = f"scoring '{result['scoring']}', gate {result['gate_m']:g} m"
@@ -74,8 +77,15 @@ def print_scores(result: Mapping[str, Any]) -> None:
         typer.echo("after mapping: n/a (the detector does not cluster positions)")
     times = result["latency_us"]
     if times is not None:
-        shown = [f"{key.replace('_', ' ')} {number(times[key], 1, 1.0, 'us', 'too few calls')}" for key in _TIMES]
-        typer.echo(f"time a frame from samples to rows, one frame a call ({times['n']} calls): {', '.join(shown)}")
+        shown = [
+            f"{key.replace('_', ' ')} {number(times[key], 1, 1.0, 'us', 'too few calls')}"
+            for key in _TIMES
+            if key in times
+        ]
+        how = f"as the file reports it ({times['n']} frames)"
+        if not times.get("as_reported"):
+            how = f"from samples to rows, one frame a call ({times['n']} calls)"
+        typer.echo(f"time a frame, {how}: {', '.join(shown)}")
     print_notes(result["notes"])
 
 
@@ -130,19 +140,32 @@ def print_report(report: Report) -> None:
 def print_leaderboard(report: Report) -> None:
     """Print how the detectors did on each dataset, best first, and what did not work."""
     from uwbbench.show.text.quantity import Quantity, undefined_titles
+    from uwbbench.show.text.report import Tables
+    from uwbbench.show.text.wording import set_aside_warning
 
-    quantities = Quantity.of_all(report.metrics.brief)
+    for sheet in (*Tables(report).published(), *Tables(report).limits()):
+        print_table(sheet.title, sheet.columns, sheet.rows)
+        for note in sheet.notes:
+            typer.echo(f"  {note}")
+        typer.echo()
+    main = report.metrics.ranking(exhaustive=all(about["exhaustive"] for about, _ in report.estimates))
+    brief = Quantity.of_all(report.metrics.brief).items()
+    quantities = dict(sorted(brief, key=lambda item: item[0] != main))  # the one that ranks, and the time beside it
     groups: dict[str, list[list[str]]] = {}
     open_world: set[str] = set()
     for about, estimates in report.estimates:
+        if about["dataset"] in report.limits.datasets:  # test signals have the tables above, and no leader
+            continue
         title = f"{about['dataset']}, {about['source'].upper()}"
         if not about["exhaustive"]:
             open_world.add(title)
         numbers = [number(estimates[name].value, by.digits, by.factor) for name, by in quantities.items()]
-        others = [number(about["p50_us"], 0), number(about["chance_recall"], 3)]
-        groups.setdefault(title, []).append([about["scoring"], about["table"], about["detector"], *numbers, *others])
+        numbers.insert(1, time_us(about, "p50_us"))
+        numbers.append(number(about["chance_recall"], 3))
+        label = report.label(about["detector"])
+        groups.setdefault(title, []).append([about["scoring"], about["table"], label, *numbers])
     heads = [by.axis for by in quantities.values()]
-    columns = ["scoring", "after", "detector", *heads, "p50 (us)", "chance recall"]
+    columns = ["scoring", "after", "detector", heads[0], "p50 (us)", *heads[1:], "chance recall"]
     for title, rows in groups.items():
         shown = slice(None) if title in open_world else slice(-1)
         print_table(title, columns[shown], [row[shown] for row in rows])
@@ -159,6 +182,6 @@ def print_leaderboard(report: Report) -> None:
         typer.echo(f"failed: {entry.kind}: {what}: {entry.reason}", err=True)
     for reason in dict.fromkeys(reason for _, _, reason in report.unscored):
         typer.echo(f"not scored: {reason}", err=True)
-    print_notes(report.notes)
+    print_notes([*map(set_aside_warning, report.set_aside), *report.notes])
     if failed or unscored:
         typer.echo(f"{failed} units failed, {unscored} could not be scored", err=True)

@@ -13,7 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from uwbbench.api import registry
 from uwbbench.api.check import checked
-from uwbbench.api.errors import ConfigError, PluginError
+from uwbbench.api.errors import ConfigError, PluginError, nearest
 from uwbbench.api.locate import find_config
 from uwbbench.api.override import with_values
 from uwbbench.api.yaml_file import YamlFile, parse_yaml, read_yaml
@@ -46,6 +46,11 @@ class DetectorModel(BaseModel):
     description: str = ""
     citation: str = ""
     fidelity: Literal["from-source", "reconstruction", "baseline", "reference"] = "baseline"
+    score: str | None = Field(
+        None,
+        description="Column that orders its candidates in curves without a threshold, larger first; the first of "
+        "score_db, prominence and amplitude that they have if left out.",
+    )
     extends: str | None = Field(None, description="Detector (name or file) that this one changes.")
     set: dict[str, Any] = Field(default_factory=dict, description="Values to change in the extended detector, by path.")
     pipeline: list[StepModel] = Field(min_length=1)
@@ -104,6 +109,11 @@ class DetectorConfig:
     ----------
     name, description, citation, fidelity : str
     steps : tuple of Step
+    score : str
+        Column that orders candidates in curves without a threshold; empty where the file names none.
+    results : Path or None
+        Folder in which another program has stored what it found; there are no steps then, and ``fidelity`` says so.
+        What is in it counts, not where it is: it is no part of the resolved file.
     """
 
     name: str
@@ -111,15 +121,39 @@ class DetectorConfig:
     description: str = ""
     citation: str = ""
     fidelity: str = "baseline"
+    score: str = ""
+    results: Path | None = field(default=None, compare=False)
+
+    @classmethod
+    def of_results(cls, name: str, folder: Path) -> DetectorConfig:
+        """Detector that is known by what it has written alone."""
+        return cls(name, (), fidelity=RESULTS_FILE, results=folder)
 
     def to_dict(self) -> dict[str, Any]:
         """Resolved file as plain values: what a manifest stores and an identity is made of."""
         steps = [{"use": s.use, "as": s.label, "params": s.params, "optional": s.optional} for s in self.steps]
-        return {"schema": 1, "name": self.name, "fidelity": self.fidelity, "pipeline": steps}
+        score = {"score": self.score} if self.score else {}
+        return {"schema": 1, "name": self.name, "fidelity": self.fidelity, **score, "pipeline": steps}
 
 
 KERNEL = "kernel "
 """What the names of kernels begin with among the names of sources."""
+
+RESULTS_FILE = "results file"
+"""Fidelity of a detector that is known by what it has written alone, and how tables mark its rows."""
+
+RESULTS = "results of "
+"""What the names of such detectors begin with among the names of sources."""
+
+
+def from_results(config: Mapping[str, Any]) -> bool:
+    """Whether a resolved detector is known by what it has written alone."""
+    return bool(config.get("fidelity") == RESULTS_FILE)
+
+
+def marked(name: str, *, results_file: bool) -> str:
+    """Name of a detector as tables show it, which say so where its rows are read from a file."""
+    return f"{name} ({RESULTS_FILE})" if results_file else name
 
 
 def detector_identity(config: Mapping[str, Any], sources: Mapping[str, str]) -> str:
@@ -131,10 +165,15 @@ def detector_identity(config: Mapping[str, Any], sources: Mapping[str, str]) -> 
         As :meth:`DetectorConfig.to_dict` gives it.
     sources : mapping of str to str
         SHA-256 of the sources of each stage by its name, and of each kernel, which may stand for some, by its name
-        behind ``KERNEL``. Those of other stages do not count.
+        behind ``KERNEL``. Those of other stages do not count. For a detector that is known by what it has written
+        alone: SHA-256 of that by its name behind ``RESULTS``, and nothing else.
     """
-    used = {step["use"]: sources[step["use"]] for step in config["pipeline"]}
-    used |= {name: sha256 for name, sha256 in sources.items() if name.startswith(KERNEL)}
+    if from_results(config):
+        name = f"{RESULTS}{config['name']}"
+        used = {name: sources[name]}
+    else:
+        used = {step["use"]: sources[step["use"]] for step in config["pipeline"]}
+        used |= {name: sha256 for name, sha256 in sources.items() if name.startswith(KERNEL)}
     text = json.dumps({"detector": config, "sources": used}, sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()
 
@@ -188,7 +227,19 @@ def check_detector(data: Mapping[str, Any], source: YamlFile) -> DetectorConfig:
         step = Step(item.use, label, params, item.optional, source.place(("pipeline", index)))
         _check_params(step, source, index)
         steps.append(step)
-    return DetectorConfig(model.name, tuple(_completed(steps)), model.description, model.citation, model.fidelity)
+    steps = _completed(steps)
+    _check_score(model.score, steps, source)
+    about = model.description, model.citation, model.fidelity
+    return DetectorConfig(model.name, tuple(steps), *about, model.score or "")
+
+
+def _check_score(score: str | None, steps: list[Step], source: YamlFile) -> None:
+    """Check that a step makes the column that orders candidates."""
+    made = {port for step in steps for port in registry.load_plugin("stages", step.use).produces}
+    columns = sorted(made - {"first_path", "noise", "profile", "detections", "cluster"})
+    if score is not None and score not in columns:
+        known = f"{nearest(score, columns)} They make: {', '.join(columns) or 'no column'}"
+        raise ConfigError(f"{source.place(('score',))}: no step makes the column '{score}'.{known}")
 
 
 def _completed(steps: list[Step]) -> list[Step]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, ValidationInfo, field_validator
+from pydantic import Discriminator, Field, Tag, ValidationInfo, field_validator
 
 from uwbbench.config.model import ConfigModel
 
@@ -51,6 +51,31 @@ class RegionModel(ConfigModel):
         """Values of a :class:`~uwbbench.measure.accuracy.judge.Region`, in metres and radians."""
         limits = {"min_range_m": self.min_range_m, "max_range_m": self.max_range_m}
         return {**limits, "half_angle_rad": self.half_angle_rad}
+
+
+class MetricsModel(ConfigModel):
+    """Exactly which metrics are shown, and where."""
+
+    rank: str | None = Field(default=None, description="Metric that ranks; null: the first default one that can.")
+    table: list[str] | None = Field(
+        default=None, min_length=1, description="Columns of tables, in this order; null: the default ones."
+    )
+    charts: list[str] | None = Field(
+        default=None,
+        min_length=1,
+        description="Metrics that are charted and compared in pairs; null: the default ones.",
+    )
+
+
+def _kind_of_metrics(value: Any) -> str:
+    """Which of two forms a value has, so that a mistake in one is not taken for one in the other as well."""
+    return "MetricsModel" if isinstance(value, dict | MetricsModel) else "list"
+
+
+MetricsUse = Annotated[
+    Annotated[list[str], Tag("list")] | Annotated[MetricsModel, Tag("MetricsModel")], Discriminator(_kind_of_metrics)
+]
+"""Metrics besides the default ones, or exactly which are shown where."""
 
 
 class IntervalModel(ConfigModel):

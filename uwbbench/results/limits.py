@@ -152,11 +152,16 @@ class Limits:
         self._configs = {config["name"]: config for config in folder.manifest["experiment"]["detectors"]}
 
     @cached_property
-    def trials(self) -> list[Trial]:
-        """Every detector on every test signal, in the order of the experiment."""
+    def datasets(self) -> dict[str, dict[str, Any]]:
+        """Parameters of each dataset of test signals, by its label; none in any other run."""
         used = self.folder.manifest["experiment"]["datasets"]
         signals = registry.default("dataset.limits")
-        params = {one["label"]: one["params"] for one in used if one["use"] == signals}
+        return {one["label"]: one["params"] for one in used if one["use"] == signals}
+
+    @cached_property
+    def trials(self) -> list[Trial]:
+        """Every detector on every test signal, in the order of the experiment."""
+        params = self.datasets
         entries = [
             e for e in self.folder.entries() if (e.kind, e.status) == ("accuracy", "done") and e.dataset in params
         ]

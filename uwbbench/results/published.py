@@ -1,17 +1,21 @@
 """Figures of the paper whose detector ``paper`` is, to be shown beside those of a run.
 
-They are read from ``configs/published``. A missing figure is shown as such and never filled in.
+They are read from ``configs/published``, where each has its place in the paper. They are what the authors report of
+their recordings; nothing here measured them.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import product
 from types import MappingProxyType
-from typing import Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from uwbbench.api.locate import config_folder
 from uwbbench.api.yaml_file import read_yaml
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 Row = tuple[Literal["filtering", "mapping"], int, str]
 
@@ -22,17 +26,20 @@ NAME: str = _PAPER["name"]
 ROWS: tuple[tuple[int, str], ...] = tuple(product((5, 9), ("metal", "concrete", "plywood")))
 """Channel and material of the rows of both tables."""
 
+METRICS: tuple[str, ...] = tuple(_PAPER["columns"][2:-1])
+"""Metrics of both tables, by their registered names."""
+
 FIGURES: Mapping[Row, Mapping[str, float]] = MappingProxyType(
     {
-        (table, cell.pop("channel"), cell.pop("material")): cell
-        for table, cells in _PAPER["figures"].items()
-        for cell in cells
+        (table, row[0], row[1]): {name: round(value / 100, 6) for name, value in zip(METRICS, row[2:-1], strict=True)}
+        for table, rows in _PAPER["figures"].items()
+        for row in rows
     }
 )
-"""Known cells by table, channel and material; metres and shares of one."""
+"""All cells by table, channel and material; metres and shares of one."""
 
 NOTES: Mapping[str, tuple[str, ...]] = {table: tuple(notes) for table, notes in _PAPER["notes"].items()}
-"""What is known but belongs to no single cell, by table."""
+"""What its text says otherwise, by table."""
 
 CHAIN: Mapping[str, int] = MappingProxyType({row["title"]: row["left"] for row in _PAPER["chain"]})
 """Peaks left behind each step of the paper's demonstration."""
@@ -42,7 +49,7 @@ STEPS: Mapping[str, str] = MappingProxyType({row["title"]: row["step"] for row i
 
 
 def known(table: str, channel: int | None, material: str, metric: str) -> float | None:
-    """Published figure of a cell, or None where it is not known.
+    """Published figure of a cell, or None where the paper has none.
 
     Parameters
     ----------
@@ -52,10 +59,44 @@ def known(table: str, channel: int | None, material: str, metric: str) -> float 
 
     Examples
     --------
-    >>> known("filtering", 5, "plywood", "mae"), known("mapping", 5, "plywood", "mae")
+    >>> known("filtering", 5, "plywood", "mae"), known("mapping", 9, "steel", "mae")
     (0.3074, None)
     """
     for row, figures in FIGURES.items():
         if row == (table, channel, material):
             return figures.get(metric)
     return None
+
+
+def beside(table: pd.DataFrame, detector: str, scoring: str, datasets: Sequence[str]) -> Iterator[dict[str, Any]]:
+    """Every cell of the paper with the figure of a run, and the difference.
+
+    Parameters
+    ----------
+    table : DataFrame
+        Rows by table, scoring, detector, dataset, channel and material, with a column for each metric.
+    detector, scoring : str
+        Whose figures are taken.
+    datasets : sequence of str
+        The first of them that has the channel and material is taken.
+
+    Yields
+    ------
+    dict
+        ``table``, ``channel``, ``material``, ``metric``; ``published``, ``here`` and ``difference`` (here minus
+        published) in metres or shares, NaN where the run has no such row; ``dataset``, ``source`` and ``errors``
+        (detections behind it), empty and 0 there.
+    """
+    mine = table[(table["detector"] == detector) & (table["scoring"] == scoring)]
+    order = {label: place for place, label in enumerate(datasets)}
+    for (kind, channel, material), figures in FIGURES.items():
+        fits = (mine["table"] == kind) & (mine["channel"] == channel) & (mine["material"] == material)
+        rows = sorted(mine[fits].to_dict("records"), key=lambda row: order[row["dataset"]])
+        about = {key: rows[0][key] if rows else none for key, none in _NOTHING.items()}
+        for metric, value in figures.items():
+            here = float(rows[0].get(metric, float("nan"))) if rows else float("nan")
+            cell = {"table": kind, "channel": channel, "material": material, "metric": metric}
+            yield {**cell, "published": value, "here": here, "difference": here - value, **about}
+
+
+_NOTHING: Mapping[str, Any] = {"dataset": "", "source": "", "errors": 0}

@@ -19,6 +19,7 @@ from uwbbench.api.arrays import FloatArray, IntArray
 from uwbbench.api.block import Block
 from uwbbench.api.capture import Capture
 from uwbbench.api.errors import CaptureError, UwbbenchError
+from uwbbench.api.interruption import by_plugin
 from uwbbench.api.radar import Radar
 from uwbbench.config.source import CaptureRef
 from uwbbench.results.delay import delay_of_range, zero_tap
@@ -54,7 +55,9 @@ def reopened(used: Mapping[str, Any], name: str, sha256: str, roots: Sequence[Pa
         same = small and capture.sha256 == sha256
     except UwbbenchError as error:
         raise CaptureError(str(error)) from error
-    except Exception as error:  # an adapter may raise anything
+    except BaseException as error:  # an adapter may raise anything
+        if not by_plugin(error):
+            raise
         raise CaptureError(f"capture '{name}' cannot be opened: {type(error).__name__}: {error}") from error
     if not small:
         raise CaptureError(f"capture '{name}' is too large to be read for a picture")

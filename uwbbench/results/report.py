@@ -24,14 +24,21 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from uwbbench.api.errors import StoreError
+from uwbbench.config.detector import from_results, marked
 from uwbbench.measure.accuracy.metrics.choice import MetricChoice
+from uwbbench.measure.accuracy.ranked import RankedCounts
 from uwbbench.measure.accuracy.stats import Estimate
 from uwbbench.results import published
+from uwbbench.results.error_causes import ErrorCauses, error_causes
 from uwbbench.results.limits import Limits
+from uwbbench.results.ranked_curves import CurveKey, RankedCurve, ranked_curve
 from uwbbench.results.results import Scored, errors_in, estimates_of, scored
+from uwbbench.results.set_aside import SetAside, set_aside
+from uwbbench.results.slices import Board
 from uwbbench.results.times import age_columns, comparable, in_words, step_columns, timed_of
 from uwbbench.run.folder.folder import RunFolder
 from uwbbench.run.folder.journal import Entry
+from uwbbench.run.folder.reported import REPORTED_FACT
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -79,6 +86,7 @@ class Report:
         self.experiment: dict[str, Any] = folder.manifest["experiment"]
         self.entries: list[Entry] = folder.entries()
         self.detectors: list[str] = [config["name"] for config in self.experiment["detectors"]]
+        self.read_only: set[str] = {one["name"] for one in self.experiment["detectors"] if from_results(one)}
         self.metrics = MetricChoice(self.experiment["metrics"])
         self.settings: dict[str, Any] = {**self.experiment["intervals"], "seed": self.experiment["seed"]}
 
@@ -113,18 +121,27 @@ class Report:
             "errors": errors_in(one.outcome for one in members),
             "exhaustive": all(one.outcome.exhaustive for one in members),
             "chance_recall": float((chance * truths).sum() / truths.sum()) if truths.sum() else math.nan,
+            "results_file": first.detector in self.read_only,
             **self._times(first.detector, first.dataset),
         }
 
     def _times(self, detector: str, dataset: str) -> dict[str, Any]:
-        """Times of a detector: medians over the captures that were timed."""
-        timed = self.measured(dataset, detector)
-        return {key: _median(entry.facts[key] for entry in timed) for key in ("p50_us", "p99_us")}
+        """Times of a detector: medians over the captures that were timed, or as its results files report them."""
+        if detector in self.read_only:
+            mine = [e.facts for e in self._of_kind("accuracy") if (e.detector, e.dataset) == (detector, dataset)]
+            timed = [facts[REPORTED_FACT] for facts in mine if REPORTED_FACT in facts]
+        else:
+            timed = [entry.facts for entry in self.measured(dataset, detector)]
+        return {key: _median(facts[key] for facts in timed) for key in ("p50_us", "p99_us")}
 
     def measured(self, dataset: str, detector: str | None = None) -> list[Entry]:
         """Latency units of a dataset whose times may stand side by side, of one detector or of all."""
         units = comparable(entry for entry in self._of_kind("latency") if entry.dataset == dataset)
         return [entry for entry in units if detector in (None, entry.detector)]
+
+    def label(self, detector: str, text: str | None = None) -> str:
+        """Name of a detector, or another text for it, as tables show it: marked where its results were read."""
+        return marked(text or detector, results_file=detector in self.read_only)
 
     def _of_kind(self, kind: str) -> list[Entry]:
         return [entry for entry in self.entries if entry.kind == kind and entry.status == "done"]
@@ -146,6 +163,28 @@ class Report:
             groups = {estimate.groups for estimate in estimates.values()}
             rows.append(about | _columns(estimates) | {"groups": max(groups)})
         return pd.DataFrame(rows)
+
+    @cached_property
+    def causes(self) -> list[ErrorCauses]:
+        """Where errors come from, of each detector on each board, in the order of the leaderboard."""
+        order = {(*_board(about), about["detector"]): place for place, (about, _) in enumerate(self.estimates)}
+        return sorted(error_causes(self.scored), key=lambda one: order[(*one.board, one.detector)])
+
+    @cached_property
+    def curves(self) -> dict[CurveKey, RankedCurve]:
+        """What each detector would find at every threshold, by dataset, source and detector.
+
+        Those are left out whose candidates are not known under the rules of the scores.
+        """
+        groups: dict[CurveKey, list[RankedCounts]] = defaultdict(list)
+        scored = {(one.detector, one.dataset, one.capture) for one in self.scored}
+        for entry in self._of_kind("accuracy"):
+            if (entry.detector, entry.dataset, entry.capture) in scored:
+                counts = self.folder.curve(entry.unit, self.folder.rules[0])
+                if counts is not None:
+                    groups[entry.dataset, entry.facts["source"], entry.detector].append(counts)
+        made = {key: ranked_curve(parts, self.settings["confidence"]) for key, parts in sorted(groups.items())}
+        return {key: curve for key, curve in made.items() if curve is not None}
 
     @cached_property
     def paper_tables(self) -> pd.DataFrame:
@@ -175,6 +214,17 @@ class Report:
         table = self.paper_tables
         rows = set() if table.empty else set(zip(table["channel"], table["material"], strict=True))
         return rows >= set(published.ROWS)
+
+    @cached_property
+    def published(self) -> list[dict[str, Any]]:
+        """Every published cell beside that of the first detector and scoring of this run; none for other runs."""
+        if not self.repeats_the_paper:
+            return []
+        table, datasets = self.paper_tables, [used["label"] for used in self.experiment["datasets"]]
+        scoring = next(rule.scoring for rule in self.folder.rules if rule.scoring in set(table["scoring"]))
+        detector = next(name for name in self.detectors if name in set(table["detector"]))
+        rows = published.beside(table, detector, scoring, datasets)
+        return [{"detector": detector, "scoring": scoring} | row for row in rows]
 
     @cached_property
     def chains(self) -> pd.DataFrame:
@@ -252,6 +302,11 @@ class Report:
         return [{"detector": name} | facts[name] for name in self.detectors if name in facts]
 
     @cached_property
+    def set_aside(self) -> list[SetAside]:
+        """Where a scoring looked at less than half of what a detector found."""
+        return set_aside(self.folder, self._of_kind("accuracy"), self.scored)
+
+    @cached_property
     def failures(self) -> list[Entry]:
         """Units, and whole datasets, that failed."""
         return [entry for entry in self.entries if entry.status == "failed"]
@@ -285,12 +340,19 @@ class Report:
             "run": str(self.folder.path),
             "experiment": self.experiment["name"],
             "leaderboard": rows,
+            "causes": [one.to_dict() for one in self.causes],
+            "curves": [
+                {**dict(zip(("dataset", "source", "detector"), key, strict=True)), **curve.to_dict()}
+                for key, curve in self.curves.items()
+            ],
             "paper_tables": self.paper_tables.to_dict("records"),
+            "published": self.published,
             "chains": self.chains.to_dict("records"),
             "limits": self.limits.to_dict(),
             "latency": [{**facts_of(e), **e.facts, "timed": timed_of(e.facts)} for e in self._of_kind("latency")],
             "captures": self.captures,
             "stability": self.stability,
+            "set_aside": [dataclasses.asdict(one) for one in self.set_aside],
             "failures": [{key: getattr(entry, key) for key in keys} for entry in self.failures],
             "unscored": [{**facts_of(entry), "scoring": s, "reason": reason} for entry, s, reason in self.unscored],
             "notes": self.notes,
@@ -308,6 +370,10 @@ def _columns(estimates: Mapping[str, Estimate]) -> dict[str, float]:
             f"{name}_n": estimate.n,
         }
     return columns
+
+
+def _board(about: Mapping[str, Any]) -> Board:
+    return about["dataset"], about["source"], about["scoring"], about["table"]
 
 
 def facts_of(entry: Entry) -> dict[str, str]:

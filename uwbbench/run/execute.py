@@ -5,14 +5,12 @@ from __future__ import annotations
 import dataclasses
 import os
 import re
-import signal
-import threading
 import time
 import traceback
 import uuid
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
@@ -21,14 +19,17 @@ from typing import Any
 from joblib import Parallel, delayed
 
 from uwbbench.api.errors import StoreError, UwbbenchError
-from uwbbench.config.detector import DetectorConfig, read_detector
+from uwbbench.api.interruption import by_plugin, listening
+from uwbbench.config.detector import DetectorConfig, detector_identity, read_detector
 from uwbbench.detect.pipeline import Pipeline
+from uwbbench.detect.results_folder import ResultsFolder
 from uwbbench.measure.latency.machine import machine, usable_cores
 from uwbbench.run import environment
 from uwbbench.run.experiment import Experiment
 from uwbbench.run.folder.folder import RunFolder
 from uwbbench.run.folder.identity import accuracy_identity, canonical, latency_identity, plain, stability_name
 from uwbbench.run.folder.journal import Entry
+from uwbbench.run.folder.reported import REPORTED_FACT
 from uwbbench.run.folder.scored import rules_of, table_of, with_metrics
 from uwbbench.run.hard_cases import examined
 from uwbbench.run.hard_cases import failed as unexamined
@@ -105,10 +106,11 @@ def run_experiment(
         If the user interrupts; nothing finished is lost.
     """
     workers = usable_cores() if jobs is None else max(1, jobs)
-    folder = _resumed(experiment, out, workers) if resume else _created(experiment, out, workers)
     todo = plan(experiment)
+    made = _resumed if resume else _created
+    folder = made(experiment, todo, out, workers)
     try:
-        with _terminable():
+        with listening():
             _Run(folder, experiment, todo, workers, progress).carry_out()
         folder.seal()
     except KeyboardInterrupt:
@@ -116,45 +118,38 @@ def run_experiment(
     return folder
 
 
-@contextmanager
-def _terminable() -> Iterator[None]:
-    """Let a request to terminate end a run as the interrupt key does: results kept, workers gone."""
-    if threading.current_thread() is not threading.main_thread():  # signals reach the main thread only
-        yield
-        return
-    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTERM, before)
-
-
-def _created(experiment: Experiment, out: Path | None, jobs: int) -> RunFolder:
+def _created(experiment: Experiment, todo: Plan, out: Path | None, jobs: int) -> RunFolder:
     if out is None:
         safe = re.sub(r"[^\w.-]+", "-", experiment.name, flags=re.ASCII).strip("-.")[:60] or "run"
         out = Path("runs") / f"{safe}-{datetime.now():%Y%m%d-%H%M%S}"
     manifest = {
         "experiment": experiment.to_dict(),
-        **_code(experiment),
+        **_code(experiment, todo),
         "sessions": [environment.session(jobs)],
     }
     return RunFolder.create(out, manifest)
 
 
-def _code(experiment: Experiment) -> dict[str, Any]:
-    """Identities of the detectors and of the reference of times, and hashes of the sources of their stages."""
-    pipelines = [Pipeline(config) for config in experiment.detectors]
+def _code(experiment: Experiment, todo: Plan) -> dict[str, Any]:
+    """Identities of the detectors and of the reference of times, and hashes of what their results come from."""
+    sources: dict[str, str] = {}
+    for config in experiment.detectors:
+        if config.results is None:
+            sources |= Pipeline(config).sources
+        else:
+            units = [unit for unit in todo.units if unit.detector.name == config.name]
+            sources |= ResultsFolder(config).source((unit.dataset, unit.ref.name) for unit in units)
     reference = None
     if experiment.latency.enabled and experiment.latency.reference is not None:
         reference = Pipeline(read_detector(experiment.latency.reference)).identity
     return {
-        "detectors": {pipeline.name: pipeline.identity for pipeline in pipelines},
-        "sources": {use: sha256 for pipeline in pipelines for use, sha256 in pipeline.sources.items()},
+        "detectors": {config.name: detector_identity(config.to_dict(), sources) for config in experiment.detectors},
+        "sources": sources,
         "reference": reference,
     }
 
 
-def _resumed(experiment: Experiment, out: Path | None, jobs: int) -> RunFolder:
+def _resumed(experiment: Experiment, todo: Plan, out: Path | None, jobs: int) -> RunFolder:
     if out is None:
         raise StoreError("resuming needs the run folder to continue")
     folder = RunFolder(out)
@@ -166,7 +161,7 @@ def _resumed(experiment: Experiment, out: Path | None, jobs: int) -> RunFolder:
             "resume with the same experiment, or give a new folder"
         )
     folder.update_manifest(
-        **_code(experiment),
+        **_code(experiment, todo),
         sessions=[*folder.manifest["sessions"], environment.session(jobs)],
     )
     return folder
@@ -225,7 +220,7 @@ class _Run:
     @property
     def _examinable(self) -> tuple[DetectorConfig, ...]:
         """Detectors to examine with the hard cases."""
-        return self.experiment.detectors if self.experiment.stability else ()
+        return self.experiment.runnable if self.experiment.stability else ()
 
     def _unexamined(self, before: dict[str, Entry]) -> list[DetectorConfig]:
         """Detectors whose stability is not known, or has changed with their sources."""
@@ -273,7 +268,11 @@ class _Run:
 
     def _identity(self, unit: Unit, sha256: str) -> str:
         """Identity of a unit on a capture of this content, here and now."""
-        detector = Pipeline(unit.detector).identity
+        if unit.detector.results is None:
+            detector = Pipeline(unit.detector).identity
+        else:
+            stored = ResultsFolder(unit.detector)
+            detector = stored.identity(stored.content(unit.dataset, unit.ref.name))
         if unit.kind == "latency":
             return latency_identity(detector, sha256, self.experiment.latency.model_dump(), machine())
         return accuracy_identity(detector, sha256, self.rules)
@@ -302,6 +301,10 @@ class _Run:
         if finished.header is not None and finished.found is not None:
             self.folder.write_header(entry.capture_id, finished.header, finished.sha256)
             self.folder.write_detections(entry.unit, finished.found, finished.candidates)
+            if finished.curve is not None:
+                self.folder.write_curve(entry.unit, finished.curve, self.rules[0])
+        if finished.times_us is not None:
+            self.folder.write_times(entry.unit, finished.times_us, entry.facts.get(REPORTED_FACT, {}))
         self._journal(entry)
 
     def _journal(self, entry: Entry) -> None:
@@ -316,7 +319,9 @@ class _Run:
         started = time.perf_counter()
         try:
             latency = measure(unit.ref, unit.detector, self.experiment.latency)
-        except Exception as error:  # noqa: BLE001 - a measurement that fails is a row
+        except BaseException as error:  # a measurement that fails is a row
+            if not by_plugin(error):
+                raise
             self._journal(entry_of(unit, "failed", reason=reason_of(error), traceback=traceback.format_exc()))
             return
         self.folder.write_times(unit.id, latency.times_us, latency.to_dict(), latency.step_us)

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import Field, field_validator
+from pydantic import Discriminator, Field, Tag, field_validator
 
 from uwbbench.api import registry
 from uwbbench.api.check import checked
@@ -20,7 +20,7 @@ from uwbbench.config.detector import DetectorConfig, read_detector
 from uwbbench.config.extends import extended, placed
 from uwbbench.config.given import Given, read_given
 from uwbbench.config.model import ConfigModel, DetectorName
-from uwbbench.config.rules import GateRadius, IntervalModel, RegionModel, Scoring, Strongest
+from uwbbench.config.rules import GateRadius, IntervalModel, MetricsUse, RegionModel, Scoring, Strongest
 from uwbbench.config.source import data_roots
 from uwbbench.measure.latency.settings import LatencyModel
 
@@ -33,6 +33,31 @@ class DetectorUse(ConfigModel):
     set: dict[str, Any] = Field(default_factory=dict, description="Values to change in the detector, by path.")
 
 
+class ResultsUse(ConfigModel):
+    """What another program has found, in a folder of results files."""
+
+    results: str = Field(min_length=1, description="Folder with CAPTURE.csv or .parquet for each capture.")
+    name: str | None = Field(default=None, min_length=1, description="Name in tables; the folder's if left out.")
+
+
+def _kind(item: Any) -> str:
+    """Form that an item of ``detectors`` has, so that a mistake is explained by that form alone."""
+    if item is None:
+        return "null"
+    if isinstance(item, dict):
+        return ResultsUse.__name__ if "results" in item else DetectorUse.__name__
+    return type(item).__name__ if isinstance(item, DetectorUse | ResultsUse) else "name"
+
+
+DetectorItem = Annotated[
+    Annotated[str, Tag("name")]
+    | Annotated[None, Tag("null")]
+    | Annotated[DetectorUse, Tag(DetectorUse.__name__)]
+    | Annotated[ResultsUse, Tag(ResultsUse.__name__)],
+    Discriminator(_kind),
+]
+
+
 class ExperimentModel(ConfigModel):
     """An experiment: detectors times captures, scored and timed."""
 
@@ -41,15 +66,18 @@ class ExperimentModel(ConfigModel):
     description: str = ""
     extends: str | None = Field(default=None, description="Experiment (name or file) that this one changes.")
     set: dict[str, Any] = Field(default_factory=dict, description="Values to change in the extended one, by path.")
-    detectors: list[str | DetectorUse | None] = Field(min_length=1, description="Names, paths, or changed detectors.")
+    detectors: list[DetectorItem] = Field(
+        min_length=1, description="Names, paths, changed detectors, or folders of results of any program."
+    )
     datasets: list[DatasetUse] = Field(min_length=1)
     scoring: list[Scoring] = Field(default=["frame", "object"], min_length=1)
     gate_m: GateRadius
     region: RegionModel = Field(default_factory=RegionModel)
     strongest: Strongest
-    metrics: list[str] = Field(
+    metrics: MetricsUse = Field(
         default_factory=list,
-        description="Registered metrics to show besides the default ones; the first ranks, if it has a better end.",
+        description="Registered metrics to show besides the default ones, of which the first ranks, if it has a better "
+        "end; or exactly which metrics rank, are columns of tables, and are charted.",
     )
     latency: LatencyModel = Field(default_factory=LatencyModel)
     stability: bool = Field(default=True, description="Put the hard cases to each detector; see 'uwbbench stability'.")
@@ -86,7 +114,8 @@ class Experiment:
     gate_m : float
     region : RegionModel
     strongest : int or None
-    metrics : tuple of str
+    metrics : tuple of str or mapping
+        As the file has it: metrics besides the default ones, or exactly which of them are shown where.
     latency : LatencyModel
     stability : bool
     seed : int
@@ -101,11 +130,16 @@ class Experiment:
     gate_m: float
     region: RegionModel
     strongest: int | None
-    metrics: tuple[str, ...]
+    metrics: tuple[str, ...] | Mapping[str, Any]
     latency: LatencyModel
     stability: bool
     seed: int
     intervals: IntervalModel
+
+    @property
+    def runnable(self) -> tuple[DetectorConfig, ...]:
+        """Detectors that can be timed and examined; of the others only results are known."""
+        return tuple(config for config in self.detectors if config.results is None)
 
     def to_dict(self) -> dict[str, Any]:
         """Resolved experiment as plain values, without the folders of this machine."""
@@ -120,7 +154,7 @@ class Experiment:
             "gate_m": self.gate_m,
             "region": self.region.model_dump(),
             "strongest": self.strongest,
-            "metrics": list(self.metrics),
+            "metrics": dict(self.metrics) if isinstance(self.metrics, Mapping) else list(self.metrics),
             "latency": self.latency.model_dump(),
             "stability": self.stability,
             "seed": self.seed,
@@ -156,9 +190,7 @@ def read_experiment(name: Given, changes: Mapping[str, Any] | None = None, data_
     model = checked(ExperimentModel, data, source)
     if model.set:
         raise ConfigError(f"{source.place(('set',))}: 'set' changes an extended experiment, but 'extends' is missing")
-    for index, metric in enumerate(model.metrics):
-        with placed(source, ("metrics", index)):
-            registry.load_plugin("metrics", metric)
+    metrics = _metrics(model, source)
     if model.latency.enabled and model.latency.reference is not None:
         with placed(source, ("latency", "reference")):
             read_detector(model.latency.reference, path.parent)
@@ -171,12 +203,31 @@ def read_experiment(name: Given, changes: Mapping[str, Any] | None = None, data_
         gate_m=model.gate_m,
         region=model.region,
         strongest=model.strongest,
-        metrics=tuple(dict.fromkeys(model.metrics)),
+        metrics=metrics,
         latency=model.latency,
         stability=model.stability,
         seed=model.seed,
         intervals=model.intervals,
     )
+
+
+def _metrics(model: ExperimentModel, source: YamlFile) -> tuple[str, ...] | dict[str, Any]:
+    """Metrics as the experiment has them, each looked up."""
+    if isinstance(model.metrics, list):
+        places: list[tuple[str, tuple[str | int, ...]]] = [(name, (at,)) for at, name in enumerate(model.metrics)]
+    else:
+        chosen = model.metrics
+        places = [(chosen.rank, ("rank",))] if chosen.rank is not None else []
+        places += [(name, ("table", at)) for at, name in enumerate(chosen.table or ())]
+        places += [(name, ("charts", at)) for at, name in enumerate(chosen.charts or ())]
+    for name, at in places:
+        with placed(source, ("metrics", *at)):
+            metric = registry.load_plugin("metrics", name)
+            if at == ("rank",) and metric.better == "zero":
+                raise ConfigError(f"metric '{name}' has no better end, so it cannot rank")
+    if isinstance(model.metrics, list):
+        return tuple(dict.fromkeys(model.metrics))
+    return model.metrics.model_dump(exclude_none=True)
 
 
 def _with_absolute_paths(values: dict[str, Any], folder: Path) -> dict[str, Any]:
@@ -188,6 +239,8 @@ def _with_absolute_paths(values: dict[str, Any], folder: Path) -> dict[str, Any]
 
 def _anchored(item: Any, folder: Path) -> Any:
     """Detector of an extended experiment: its path starts from that experiment's folder."""
+    if isinstance(item, dict) and isinstance(item.get("results"), str):
+        return {**item, "results": str((folder / item["results"]).resolve())}
     if isinstance(item, dict):
         return {**item, "use": _anchored(item.get("use"), folder)}
     here = isinstance(item, str) and is_path(item) and (folder / item).is_file()
@@ -199,15 +252,26 @@ def _detectors(model: ExperimentModel, source: YamlFile, folder: Path) -> tuple[
 
     configs: dict[str, DetectorConfig] = {}
     for index, item in enumerate(model.detectors):
-        use = item if isinstance(item, DetectorUse) else DetectorUse(use="null" if item is None else item)
         at = ("detectors", index)
-        with placed(source, at):
-            config = read_detector(use.use, folder, use.set)
-            config = replace(config, name=use.name or config.name)
-            Pipeline(config)  # checks that its steps fit together
+        if isinstance(item, ResultsUse):
+            config = _stored(item, source.place((*at, "results")), folder)
+        else:
+            use = item if isinstance(item, DetectorUse) else DetectorUse(use="null" if item is None else item)
+            with placed(source, at):
+                config = read_detector(use.use, folder, use.set)
+                config = replace(config, name=use.name or config.name)
+                Pipeline(config)  # checks that its steps fit together
         if config.name in configs:
             raise ConfigError(
                 f"{source.place(at)}: detector '{config.name}' appears twice; give one of them another 'name'"
             )
         configs[config.name] = config
     return tuple(configs.values())
+
+
+def _stored(use: ResultsUse, place: str, folder: Path) -> DetectorConfig:
+    """Detector of a folder of results, which is seen from the folder of the experiment."""
+    results = folder / use.results
+    if not results.is_dir():
+        raise ConfigError(f"{place}: {results}: no such folder")
+    return DetectorConfig.of_results(use.name or results.resolve().name, results)

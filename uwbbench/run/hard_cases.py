@@ -7,6 +7,7 @@ import traceback
 
 from uwbbench import __version__
 from uwbbench.api.errors import UwbbenchError
+from uwbbench.api.interruption import by_plugin
 from uwbbench.config.detector import DetectorConfig
 from uwbbench.detect.pipeline import Pipeline
 from uwbbench.run.environment import case_packages
@@ -36,7 +37,9 @@ def examined(detector: DetectorConfig, parent: int) -> Entry:
             facts = examine(Pipeline(detector)).to_dict()
     except UwbbenchError as error:
         facts = {"refused": str(error)}
-    except Exception as error:  # noqa: BLE001 - a plugin may raise anything; the other detectors are still examined
+    except BaseException as error:  # a plugin may raise anything; the other detectors are still examined
+        if not by_plugin(error):
+            raise
         return failed(detector, reason_of(error), traceback.format_exc())
     return dataclasses.replace(failed(detector), status="done", identity=identity_of(detector), facts=facts)
 

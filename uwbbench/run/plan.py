@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+from uwbbench.api.interruption import by_plugin
 from uwbbench.api.text import one_line
 from uwbbench.config.detector import DetectorConfig
 from uwbbench.config.source import CaptureRef
@@ -68,7 +69,9 @@ def plan(experiment: Experiment) -> Plan:
     for source in experiment.datasets:
         try:
             references = source.references()
-        except Exception as error:  # noqa: BLE001 - an adapter may raise anything; the other datasets still run
+        except BaseException as error:  # an adapter may raise anything; the other datasets still run
+            if not by_plugin(error):
+                raise
             failures.append(
                 Entry(
                     unit=listing_name(source.label),
@@ -83,7 +86,7 @@ def plan(experiment: Experiment) -> Plan:
             continue
         accuracy += [Unit("accuracy", d, source.label, ref) for ref in references for d in experiment.detectors]
         timed = references if experiment.latency.captures == "all" else references[:1]
-        latency += [Unit("latency", d, source.label, ref) for ref in timed for d in experiment.detectors]
+        latency += [Unit("latency", d, source.label, ref) for ref in timed for d in experiment.runnable]
     return Plan(tuple(accuracy + (latency if experiment.latency.enabled else [])), tuple(failures))
 
 

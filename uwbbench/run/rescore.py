@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 from uwbbench.measure.accuracy.scoring import ScoringRules
 from uwbbench.run.folder.folder import RunFolder
-from uwbbench.run.folder.scored import score_rows, table_of, with_metrics
+from uwbbench.run.folder.journal import Entry
+from uwbbench.run.folder.scored import CAUSES, rules_of, score_rows, table_of, with_causes, with_metrics
 
 
 def rescore(folder: RunFolder, rules: Sequence[ScoringRules] | None = None) -> None:
@@ -28,9 +30,26 @@ def rescore(folder: RunFolder, rules: Sequence[ScoringRules] | None = None) -> N
     chosen = folder.rules if rules is None else list(rules)
     entries = folder.entries()
     scored = {
-        entry.unit: score_rows(folder.detections(entry.unit), folder.header(entry.capture_id), chosen)
+        entry.unit: _scored_again(folder, entry, chosen)
         for entry in entries
         if entry.kind == "accuracy" and entry.status == "done"
     }
     rows = with_metrics(folder, scored, chosen, folder.manifest["experiment"]["metrics"])
     folder.write_scores(table_of(entries, rows), chosen)
+
+
+def _scored_again(folder: RunFolder, entry: Entry, rules: Sequence[ScoringRules]) -> list[dict[str, Any]]:
+    """Rows of a unit; where its candidates are not stored, causes of misses are those that its run has found.
+
+    These hold under the rules of the run alone; under others they are not known.
+    """
+    detections, header = folder.detections(entry.unit), folder.header(entry.capture_id)
+    rows = with_causes(score_rows(detections, header, rules), detections, header, rules)
+    if detections.candidates is None:
+        same = {rule.scoring for rule in set(rules) & set(rules_of(folder.manifest["experiment"]))}
+        known = {(row["scoring"], row["table"]): row[CAUSES] for row in entry.scores if CAUSES in row}
+        for row in rows:
+            key = row["scoring"], row["table"]
+            if row["scoring"] in same and key in known:
+                row[CAUSES] = known[key]
+    return rows

@@ -3,22 +3,29 @@
 from __future__ import annotations
 
 import os
-import signal
 import threading
 import time
 import traceback
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
+from uwbbench.api.arrays import FloatArray
 from uwbbench.api.capture import Capture, CaptureHeader
 from uwbbench.api.detections import HANDED_OUT, Detections
+from uwbbench.api.interruption import by_plugin, leave_to_parent
+from uwbbench.config.detector import RESULTS_FILE
 from uwbbench.config.source import CaptureRef
 from uwbbench.detect.pipeline import Pipeline
+from uwbbench.detect.results_file import ResultsFile
+from uwbbench.detect.results_folder import ResultsFolder
+from uwbbench.measure.accuracy.judge import Scene
+from uwbbench.measure.accuracy.ranked import RankedCounts, ranked
 from uwbbench.measure.accuracy.scoring import ScoringRules
 from uwbbench.run.folder.identity import accuracy_identity
 from uwbbench.run.folder.journal import Entry, Status
-from uwbbench.run.folder.scored import score_rows
+from uwbbench.run.folder.reported import REPORTED_FACT, RESULTS_FACT, reported_times
+from uwbbench.run.folder.scored import score_rows, with_causes
 from uwbbench.run.plan import Unit, reason_of
 
 
@@ -53,6 +60,10 @@ class Finished:
     header : CaptureHeader or None
     sha256 : str
         Of the capture's content.
+    curve : RankedCounts or None
+        What the candidates would give at every threshold.
+    times_us : (processed frames,) array or None
+        Time of each frame as another program reports it.
     """
 
     entry: Entry
@@ -60,6 +71,8 @@ class Finished:
     candidates: Detections | None = None
     header: CaptureHeader | None = None
     sha256: str = ""
+    curve: RankedCounts | None = None
+    times_us: FloatArray | None = None
 
 
 _last: list[tuple[str, CaptureRef, Capture]] = []
@@ -76,15 +89,17 @@ def content_of(job: Job) -> str:
     """SHA-256 of a unit's capture; empty where it cannot be opened."""
     try:
         return _opened(job.session, job.unit.ref).sha256
-    except Exception:  # noqa: BLE001 - the unit itself will fail in the same way, and say so
-        return ""
+    except BaseException as error:
+        if not by_plugin(error):
+            raise
+        return ""  # the unit itself will fail in the same way, and say so
 
 
 def die_with(parent: int) -> None:
     """Make a worker leave the interrupt key to its parent, and end when the parent has ended, however it ended."""
     if os.getpid() == parent or threading.current_thread() is not threading.main_thread():
         return
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    leave_to_parent()
 
     def watch() -> None:
         while os.getppid() == parent:
@@ -105,7 +120,9 @@ def run_unit(job: Job) -> Finished:
     try:
         with threadpool_limits(1):
             finished = _detected(job)
-    except Exception as error:  # noqa: BLE001 - a plugin may raise anything; the other units still run
+    except BaseException as error:  # a plugin may raise anything; the other units still run
+        if not by_plugin(error):
+            raise
         return Finished(entry_of(unit, "failed", reason=reason_of(error), traceback=traceback.format_exc()))
     finished.entry.facts["elapsed_s"] = time.perf_counter() - started
     return finished
@@ -114,11 +131,16 @@ def run_unit(job: Job) -> Finished:
 def _detected(job: Job) -> Finished:
     unit = job.unit
     capture = _opened(job.session, unit.ref)
-    with_candidates = any(rule.scoring == "peak" for rule in job.rules)
-    pipeline = Pipeline(unit.detector)
-    detections = pipeline.run(capture, handed_out=True)
-    candidates = detections.candidates if with_candidates else None
+    if unit.detector.results is None:
+        pipeline = Pipeline(unit.detector)
+        # Kernels count nothing that they drop, so a second pass tells; plain stages do so in the first.
+        detections = pipeline.run(capture, candidates=not pipeline.open(capture).fused, handed_out=True)
+        identity, stored, results = pipeline.identity, None, dict[str, Any]()
+    else:
+        stored, results = _read(unit, capture)
+        detections, identity = stored.detections, ResultsFolder(unit.detector).identity(stored.sha256)
     header = capture.header
+    rows = score_rows(detections, header, job.rules)
     facts = {
         "source": header.source,
         "frames": len(header),
@@ -130,16 +152,42 @@ def _detected(job: Job) -> Finished:
         "notes": list(detections.notes),
         "chain": dict(detections.chain),
         "sha256": capture.sha256,
+        **results,
     }
     entry = entry_of(
         unit,
         "done",
-        identity=accuracy_identity(pipeline.identity, capture.sha256, job.rules),
+        identity=accuracy_identity(identity, capture.sha256, job.rules),
         capture_id=unit.capture_id,
-        scores=score_rows(detections, header, job.rules),
+        scores=with_causes(rows, detections, header, job.rules),
         facts=facts,
     )
-    return Finished(entry, _bare(detections), None if candidates is None else _bare(candidates), header, capture.sha256)
+    scorable = any(row["status"] == "scored" for row in rows)
+    curve = ranked(detections, Scene.of(detections, header), job.rules[0], unit.detector.score) if scorable else None
+    kept = detections.candidates if any(rule.scoring == "peak" for rule in job.rules) else None
+    return Finished(
+        entry=entry,
+        found=_bare(detections),
+        candidates=None if kept is None else _bare(kept),
+        header=header,
+        sha256=capture.sha256,
+        curve=curve,
+        times_us=None if stored is None else stored.times_us,
+    )
+
+
+def _read(unit: Unit, capture: Capture) -> tuple[ResultsFile, dict[str, Any]]:
+    """What another program has found, and facts about its file; its times are summed up as reported."""
+    folder = ResultsFolder(unit.detector)
+    stored = folder.read(unit.dataset, unit.ref.name, capture)
+    path = folder.file_of(unit.dataset, unit.ref.name)
+    facts: dict[str, Any] = {RESULTS_FACT: {"file": str(path.relative_to(folder.folder)), "sha256": stored.sha256}}
+    if stored.times_us is not None and len(stored.times_us):
+        facts[REPORTED_FACT] = reported_times(stored.times_us)
+    about = "times as it reports them" if REPORTED_FACT in facts else "no time"
+    note = f"{RESULTS_FILE}: read, not run; {about}, and no hard cases"
+    annotated = stored.detections.annotated(notes=[note, *stored.detections.notes])
+    return replace(stored, detections=annotated), facts
 
 
 def entry_of(unit: Unit, status: Status, **values: Any) -> Entry:

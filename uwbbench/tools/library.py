@@ -15,6 +15,7 @@ from uwbbench.config.given import Given
 from uwbbench.config.source import data_roots
 from uwbbench.config.source import open_dataset as opened_dataset
 from uwbbench.detect.pipeline import Pipeline, load_detector
+from uwbbench.measure.accuracy.metrics.choice import names_of
 from uwbbench.tools.leaderboard import Leaderboard, leaderboard
 from uwbbench.tools.stored_run import Run
 
@@ -100,7 +101,9 @@ def _check_reach(plan: Experiment, jobs: int | None) -> None:
     used: list[tuple[registry.PluginKind, str]] = [
         ("stages", step.use) for config in plan.detectors for step in config.steps
     ]
-    used += [("datasets", source.use) for source in plan.datasets] + [("metrics", name) for name in plan.metrics]
+    used += [("datasets", source.use) for source in plan.datasets] + [
+        ("metrics", name) for name in names_of(plan.metrics)
+    ]
     for kind, name in used:
         if registry.entry(kind, name).package == registry.HERE_ALONE and (jobs != 1 or plan.latency.enabled):
             raise ConfigError(

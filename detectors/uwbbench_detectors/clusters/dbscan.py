@@ -27,6 +27,12 @@ class DbscanParams(Params):
     )
     min_samples: int = Field(20, ge=1, description="Points in the neighbourhood of a core point, itself included.")
     every: int = Field(50, ge=1, description="New points that start a re-clustering.")
+    when: Literal["reached", "exceeded"] = Field(
+        "reached",
+        description="Whether re-clustering starts with the last of these new points or with the one after it: arXiv "
+        "2512.01018 says 'after more than min_peaks peaks have been recorded' ('Complete pipeline visualisation'), and "
+        "calls it the minimum number in its table of key parameters.",
+    )
     window: int | None = Field(
         None,
         ge=1,
@@ -44,12 +50,17 @@ class DbscanParams(Params):
         if self.window is not None:
             if self.labels == "final":
                 raise ValueError("labels: final clusters all points; leave 'window' out")
-            if self.window < max(self.every, self.min_samples):
+            if self.window < max(self.period, self.min_samples):
                 raise ValueError(
-                    f"'window' must be at least 'every' ({self.every}), or points would never be clustered, and at "
+                    f"'window' must be at least 'every' ({self.period}), or points would never be clustered, and at "
                     f"least 'min_samples' ({self.min_samples}), or no cluster could form"
                 )
         return self
+
+    @property
+    def period(self) -> int:
+        """New points from one re-clustering to the next."""
+        return self.every + (self.when == "exceeded")
 
 
 class Dbscan(Stage[DbscanParams]):
@@ -99,14 +110,14 @@ class Dbscan(Stage[DbscanParams]):
         before = self._new
         self._held.add(detections if all_located else detections.take(located))
         self._new += count
-        due = self._new - self._new % self.params.every
+        due = self._new - self._new % self.params.period
         if all_located and not due:
             return block.replace(detections=self._none_of(detections))
         columns, rounds = self._recluster(due)
         ready = Detections(**columns, processed=detections.processed, notes=detections.notes)
         if not all_located:
             # They come out at once: before what is released by the round that they arrived in.
-            lost_in = ((before + np.cumsum(located)) // self.params.every)[~located]
+            lost_in = ((before + np.cumsum(located)) // self.params.period)[~located]
             order = np.argsort(np.concatenate([lost_in, rounds]), kind="stable")
             ready = Detections.join([_with_cluster(detections.take(~located), NOISE), ready]).take(order)
         return block.replace(detections=ready)
@@ -128,8 +139,8 @@ class Dbscan(Stage[DbscanParams]):
 
         params = self.params
         if params.window is None:
-            return GrowingRounds(params.eps_m, params.min_samples, params.every)
-        return WindowedRounds(params.eps_m, params.min_samples, params.every, params.window)
+            return GrowingRounds(params.eps_m, params.min_samples, params.period)
+        return WindowedRounds(params.eps_m, params.min_samples, params.period, params.window)
 
     def _none_of(self, detections: Detections) -> Detections:
         """Detections without rows, prepared once: most calls release nothing."""
@@ -150,7 +161,7 @@ class Dbscan(Stage[DbscanParams]):
         # Map coordinates of millions of metres would cost digits.
         decided = self._rounds.extend(points_m - self._origin_m)
         self._new -= count
-        self.clusterings += -(-count // self.params.every)
+        self.clusterings += -(-count // self.params.period)
         return {**self._held.release(decided.points), "cluster": decided.clusters}, decided.rounds
 
     def _final_clusters(self, held: Detections) -> IntArray:

@@ -220,7 +220,7 @@ def _azimuth(chain: Chain, stage: Azimuth) -> bool:
 def _range(chain: Chain, stage: Range) -> bool:
     radar = chain.radar
     chain.how[at.RANGED] = at.RANGED_EXACT if stage.params.geometry == "exact" else at.RANGED_SINE
-    chain.limits[at.INTERVAL_S] = radar.sample_interval_s
+    chain.limits[at.INTERVAL_S] = stage.interval_s
     chain.limits[at.SPEED_RATIO] = stage.speed_ratio
     from_transmission = radar.first_tap_delay_s is not None or not stage.params.includes_baseline
     chain.limits[at.EXCESS_OFFSET_M] = radar.baseline_length_m if from_transmission else 0.0

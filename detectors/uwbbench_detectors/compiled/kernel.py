@@ -24,6 +24,8 @@ WORTH_A_CALL = 16
 
 _NO_VALUES: FloatArray = np.zeros(1)
 _NO_POSES: FloatArray = np.zeros((1, 3))
+for _nothing in (_NO_VALUES, _NO_POSES):
+    _nothing.flags.writeable = False
 
 
 class FrameSearch(Kernel):
@@ -72,8 +74,8 @@ class FrameSearch(Kernel):
             self._irregular = irregular = np.empty(count, np.bool_)
         if self._alone and count < WORTH_SHARING:  # most calls of a stream, in which every step counts
             written = self._search_alone(
-                samples if samples.flags.carray else np.array(samples),
-                frames.valid,
+                _plain(samples),
+                _plain(frames.valid),
                 frames.first,
                 self._how,
                 self._limits,
@@ -119,7 +121,7 @@ class FrameSearch(Kernel):
         samples = _plain(frames.preamble)
         settings = frames.first, self._how, self._limits, self._order, noise_tally, table, irregular
         if self._alone:
-            return self._search_alone(samples, frames.valid, *settings)
+            return self._search_alone(samples, _plain(frames.valid), *settings)
         given = path = path1 = path2 = yaw_rad = _NO_VALUES
         robot_m = _NO_POSES
         response1 = response2 = samples
@@ -136,7 +138,7 @@ class FrameSearch(Kernel):
         if self._placed:
             robot_m, yaw_rad = _plain(frames.position_m), _plain(frames.yaw_rad)
         inputs = given, response1, response2, path, path1, path2, robot_m, yaw_rad
-        return self._search(samples, frames.valid, *inputs, *settings)
+        return self._search(samples, _plain(frames.valid), *inputs, *settings)
 
     def _shared(
         self,
@@ -216,5 +218,12 @@ def _apart(stage: Stage[Any]) -> Stage[Any]:
 
 
 def _plain(values: Any) -> Any:
-    """Array in one piece that may be written to, as the compiled search was compiled for."""
-    return values if values.flags.carray else np.array(values)
+    """Read-only array in one piece, as the compiled search was compiled for."""
+    flags = values.flags
+    if not (flags.c_contiguous and flags.aligned):
+        values = np.array(values, order="C")
+    elif not flags.writeable:
+        return values
+    plain = values.view()
+    plain.flags.writeable = False
+    return plain

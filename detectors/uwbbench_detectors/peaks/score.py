@@ -20,7 +20,9 @@ class SnrScoreParams(Params):
         "compensates targets too little, and lifts late noise.",
     )
     delay_unit: Literal["ns", "samples"] = Field(
-        "ns", description="Unit of the delay. Samples of 1.0016 ns differ from ns by 0.16 %."
+        "ns",
+        description="Unit of the delay. Samples of 1.0016 ns differ from ns by 0.16 %; at the 1 ns that arXiv "
+        "2512.01018 prints (table of radar configurations) they are the same.",
     )
     amplitude: Literal["raw", "normalised"] = Field(
         "raw",

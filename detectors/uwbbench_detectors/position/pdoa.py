@@ -34,8 +34,8 @@ class PdoaParams(Params):
     )
     phase: Literal["atan2", "arctan"] = Field(
         "atan2",
-        description="'arctan' is arctan(Q/I) taken literally: the difference is then wrong by pi with probability "
-        "|alpha|/pi (10 % at 0.3 rad, 68 % at 2.13 rad).",
+        description="'arctan' is the arctan(Q/I) of arXiv 2512.01018 ('Signal processing') taken literally: the "
+        "difference is then wrong by pi with probability |alpha|/pi (10 % at 0.3 rad, 68 % at 2.13 rad).",
     )
     wrap: Literal["half_open", "closed_above"] = Field(
         "half_open", description="Interval of the result: [-pi, pi) or (-pi, pi]; they differ at pi alone."

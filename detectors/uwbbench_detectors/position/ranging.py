@@ -32,8 +32,9 @@ class RangeParams(Params):
 
     geometry: Literal["exact", "paper"] = Field(
         "exact",
-        description="'exact' holds for any place of the transmitter; 'paper' is the printed sine form, right only for "
-        "a transmitter beside the receiver on its right, and long by about 10 cm for one 20 cm behind it.",
+        description="'exact' holds for any place of the transmitter; 'paper' is the sine form of arXiv 2512.01018 (end "
+        "of 'Angle of Arrival'), right only for a transmitter beside the receiver on its right, and long by about "
+        "10 cm for one 20 cm behind it.",
     )
     includes_baseline: bool = Field(
         True,
@@ -41,17 +42,27 @@ class RangeParams(Params):
         "false takes d = c tau, which shortens ranges by about D/2.",
     )
     bias_m: float | Literal["paper"] = Field(
-        0.0, description="Calibration offset that is subtracted; 'paper' is 0.15 on channel 5 and 0.13 on channel 9."
+        0.0,
+        description="Calibration offset that is subtracted; 'paper' is 0.15 on channel 5 and 0.13 on channel 9 (table "
+        "of key parameters of arXiv 2512.01018).",
     )
     speed_of_light: Literal["exact", "rounded"] = Field(
-        "exact", description="'rounded' is 3e8 m/s: 0.24 cm more at 3.4 m."
+        "exact",
+        description="'rounded' is the 3e8 m/s of arXiv 2512.01018 (table of symbols): 0.24 cm more at 3.4 m.",
+    )
+    tap_ns: float | None = Field(
+        None,
+        gt=0,
+        description="Spacing of the taps that delays are made of; null takes the radar's own. arXiv 2512.01018 prints "
+        "1 ns (table of radar configurations), while its chip samples every 1.0016 ns: 0.5 cm less at 3.4 m.",
     )
 
 
 class Range(Stage[RangeParams]):
     """Delay and range of each detection.
 
-    The delay is ``(tap - first path) * sample interval``. Detections without an azimuth are taken to lie at boresight.
+    The delay is ``(tap - first path) * sample interval``, the radar's unless ``tap_ns`` gives another. Detections
+    without an azimuth are taken to lie at boresight.
     The range is NaN where the path would be shorter than the baseline, which no target can cause.
 
     Raises
@@ -89,6 +100,11 @@ class Range(Stage[RangeParams]):
         """Speed that is assumed, over the speed of light."""
         return 1.0 if self.params.speed_of_light == "exact" else ROUNDED_SPEED_M_S / SPEED_OF_LIGHT_M_S
 
+    @property
+    def interval_s(self) -> float:
+        """Spacing of the taps that delays are made of."""
+        return self.radar.sample_interval_s if self.params.tap_ns is None else self.params.tap_ns * 1e-9
+
     def recalibrated(self, column: str, offset: float) -> dict[str, float]:
         """A bias of ``offset`` metres more."""
         if column != "range_m":
@@ -102,7 +118,7 @@ class Range(Stage[RangeParams]):
     def step(self, block: Block) -> Block:
         """Block whose detections carry ``delay_s`` and ``range_m``."""
         radar = self.radar
-        delay_s = (block.detections["tap"] - block.part("first_path")[block.rows]) * radar.sample_interval_s
+        delay_s = (block.detections["tap"] - block.part("first_path")[block.rows]) * self.interval_s
         flown_s = delay_s * self.speed_ratio
         if self.params.includes_baseline:
             excess_m = radar.excess_m(flown_s)

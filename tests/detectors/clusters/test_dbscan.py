@@ -58,6 +58,15 @@ def test_over_all_points_the_clustered_ones_are_those_of_a_single_clustering(
         np.testing.assert_array_equal(by_arrival(found) >= 0, oracle.labels_ >= 0)
 
 
+@pytest.mark.parametrize(("when", "releases"), [("reached", [6, 13]), ("exceeded", [7, 15])])
+def test_clustering_starts_with_the_last_new_point_or_with_the_one_after(
+    make_stage, make_radar, block_of, when, releases
+):
+    stage = make_stage("dbscan", every=7, min_samples=3, when=when)
+    steps, _ = one_at_a_time(stage, make_radar(), block_of(np.zeros((16, 2))))
+    assert [frame for frame, step in enumerate(steps) if len(step)] == releases
+
+
 @given(seed=st.integers(0, 10_000), points=st.integers(1, 160), every=st.integers(1, 60))
 @settings(max_examples=30, deadline=None)
 def test_final_labels_are_those_of_a_single_clustering_in_order_of_arrival(clustered, seed, points, every):

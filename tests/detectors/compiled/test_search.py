@@ -134,7 +134,8 @@ def chains(draw) -> str:
         domain = draw(st.sampled_from(["theta", "alpha"]))
         steps.append(f"azimuth, params: {{formula: {formula}, bias_deg: 2.0, bias_domain: {domain}, sign: -1}}")
     geometry, baseline = draw(st.sampled_from(["exact", "paper"])), draw(st.sampled_from(["true", "false"]))
-    steps.append(f"range, params: {{geometry: {geometry}, includes_baseline: {baseline}, bias_m: 0.1}}")
+    printed = draw(st.sampled_from(["", ", tap_ns: 1.0", ", tap_ns: 1.0, speed_of_light: rounded"]))
+    steps.append(f"range, params: {{geometry: {geometry}, includes_baseline: {baseline}, bias_m: 0.1{printed}}}")
     if any(step.startswith("azimuth") for step in steps):
         steps += ["position"] * draw(st.booleans())
     lines = "".join(f"  - {{use: {step}}}\n" for step in steps)
@@ -165,6 +166,13 @@ def test_any_chain_finds_the_same_fused_and_plain(text, kind, seed, double, alig
     detector = detector_from_yaml(text)
     assert detector.open(capture).fused
     assert_same(detector.run(capture), detector.run(capture, fused=False))
+
+
+def test_phases_by_the_printed_arctan_are_left_to_the_plain_stages(approach):
+    detector = load_detector("paper", changes={"pipeline.pdoa.params": {"phase": "arctan"}})
+    found = detector.run(approach)
+    assert_same(found, detector.run(approach, fused=False))
+    assert len(found) != len(load_detector("paper").run(approach))
 
 
 @pytest.mark.parametrize("column", ["prominence", "width_taps", "score_db", "pdoa_rad"])

@@ -26,6 +26,13 @@ def taps_of(radar, excess_m):
     return excess_m / SPEED_OF_LIGHT_M_S / radar.sample_interval_s
 
 
+def test_printed_taps_of_a_nanosecond_take_the_place_of_the_radars(ranged, make_radar):
+    radar = make_radar(sample_interval_s=1.0016e-9)
+    printed = ranged(radar, [20.0], tap_ns=1.0, speed_of_light="rounded")
+    assert printed["delay_s"][0] == pytest.approx(20e-9)
+    assert printed.range_m[0] == pytest.approx(20e-9 * 3e8 / 2)
+
+
 @given(transmitter=st.tuples(PLACE, PLACE, PLACE), range_m=st.floats(0.1, 30), azimuth=st.floats(-1.5, 1.5))
 @settings(max_examples=100)
 def test_exact_range_inverts_any_placement_of_the_transmitter(ranged, make_radar, transmitter, range_m, azimuth):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
-from tests.measure.accuracy.test_scoring import at_once, capture_of, counts, found_in, post
+from tests.measure.accuracy.scenes import at_once, capture_of, counts, found_in, post
 from uwbbench.api import Detections, ScoringError
 from uwbbench.measure.accuracy.age import age_summary, latest_answers
 from uwbbench.measure.accuracy.scoring import score

@@ -85,7 +85,7 @@ class Busy(Stage[Work]):
     produces = ports("detections")
 
     def step(self, block):
-        for _ in range(2000 * self.params.rounds):
+        for _ in range(500 * self.params.rounds):
             math.sqrt(2.0)
         return block.replace(detections=Detections.empty())
 """

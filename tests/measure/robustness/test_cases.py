@@ -33,10 +33,16 @@ def test_a_detector_of_rarer_stages_stands_every_case(rare_detectors, name):
     assert [(one.check.name, one.found) for one in found.results if one.status == "failed"] == []
 
 
-@pytest.mark.parametrize("case", all_cases(), ids=lambda case: case.name)
-def test_every_case_applies_to_some_shipped_detector(case):
+@pytest.fixture(scope="module")
+def subjects():
+    """Shipped detectors of all kinds."""
     names = ("paper", "cfar-ca", "background-svd", "background-mean", "paper-subsample", "background-ema")
-    assert "passed" in {case.judge(Subject(load_detector(name))).status for name in names}
+    return [Subject(load_detector(name)) for name in names]
+
+
+@pytest.mark.parametrize("case", all_cases(), ids=lambda case: case.name)
+def test_every_case_applies_to_some_shipped_detector(subjects, case):
+    assert any(case.judge(one).status == "passed" for one in subjects)
 
 
 def test_cases_have_names_of_their_own_and_say_what_they_expect():

@@ -21,7 +21,7 @@ from uwbbench.run.folder.verify import verify
 EXPERIMENT = """\
 schema: 1
 name: small
-detectors: [cfar-os, paper-filtering]
+detectors: [oracle, paper-filtering]
 datasets:
   - {use: approach, params: {speed_m_s: 3.0, runs: 2}}
 scoring: [frame, object]
@@ -127,7 +127,7 @@ def test_another_machine_does_not_fit_the_times_even_with_a_new_seal(run: Path) 
     sessions[0]["machine"]["cpu"] = "a better one"
     manifest(run, sessions=sessions)
     sealed(run)
-    assert "latency cfar-os" in problems(run)
+    assert "latency oracle" in problems(run)
     assert "its identity is not that of its detector, capture, rules and machine" in problems(run)
 
 
@@ -140,6 +140,15 @@ def test_a_score_edited_by_hand_is_not_that_of_the_detections(run: Path) -> None
     sealed(run)
     assert "f1 0.5, not " in problems(run)
     assert problems(run).count("\n") == 0
+
+
+def test_causes_that_do_not_add_up_to_the_errors_are_found_out(run: Path) -> None:
+    entries = lines(run)
+    row = next(entry for entry in entries if entry["kind"] == "accuracy")["scores"][0]
+    row["causes"] = json.dumps({"misses": {"no candidate": row["fn"] + 1}, "false": {"noise": row["fp"]}})
+    journal(run, entries)
+    sealed(run)
+    assert f"the causes of fn add up to {row['fn'] + 1}, not to {row['fn']}" in problems(run)
 
 
 def test_a_row_of_scores_taken_out_is_missed(run: Path) -> None:

@@ -13,7 +13,9 @@ import pytest
 from uwbbench.results import Report
 from uwbbench.run.folder import RunFolder
 from uwbbench.show.html.render import embedded
-from uwbbench.show.page import Content, page, write_figures
+from uwbbench.show.page import Content, answer, page, render, write_figures
+from uwbbench.show.page.board_charts import pareto
+from uwbbench.show.page.sections import sections
 
 
 @pytest.fixture(scope="module")
@@ -71,11 +73,13 @@ def test_range_bins_hold_each_frame_once(content: Content) -> None:
 
 
 def test_every_chart_follows_the_schema_of_vega_lite_and_says_that_it_is_simulated(content: Content) -> None:
-    pictures = list(content.pictures())
+    pictures = list(render.pictures(content))
     assert {picture.name.split("-")[0] for picture in pictures} == {
         "pareto",
         "range",
         "errors",
+        "causes",
+        "curves",
         "latency",
         "radargram",
         "map",
@@ -87,15 +91,23 @@ def test_every_chart_follows_the_schema_of_vega_lite_and_says_that_it_is_simulat
 
 
 def test_the_summary_names_captures_leader_error_and_cost(content: Content) -> None:
-    (sentence,) = content.summary()
+    (sentence,) = answer.sentences(content)
     assert sentence.startswith("On 9 simulated captures of plates (")
     assert "cfar-os leads with F1 " in sentence
-    assert "times the time a frame of paper-filtering." in sentence
+    assert re.search(r", at [\d.]+x the time a frame of paper-filtering\.$", sentence)
+
+
+def test_the_answer_stands_first_and_no_section_is_empty(content: Content) -> None:
+    parts = sections(content)
+    assert [part.id for part in parts][:3] == ["summary", "leaderboard", "pareto"]
+    assert len({part.id for part in parts}) == len(parts)
+    for part in parts:
+        assert part.layout != "plain" or any((part.sentences, part.charts, part.of_board, part.sheets, part.notes))
 
 
 def test_the_front_is_given_with_a_probability(content: Content) -> None:
     board = next(iter(content.boards))
-    spec = content.pareto(board, "mae")
+    spec = pareto(content, board, "mae")
     assert spec is not None
     rows = {row["detector"]: row for row in spec["data"]["values"]}
     assert set(rows) == {"paper", "cfar-os"}  # null finds nothing
@@ -132,14 +144,16 @@ def test_a_run_in_which_nothing_could_be_scored_has_a_page(small_run: RunFolder)
     report.entries = [dataclasses.replace(e, status="failed", reason="gone", facts={}) for e in report.entries]
     text = page(Content(report))
     assert "Nothing could be scored" in text
-    assert "Nothing was timed" in text
+    assert 'id="latency"' not in text, "a section with nothing in it is left out"
     assert text.count("gone") >= len(report.entries)
 
 
-def test_figures_are_written_as_pictures_and_as_specifications(content: Content, tmp_path: Path) -> None:
-    few = list(content.pictures())[:1]
-    content_of_one = type("One", (), {"pictures": lambda self: iter(few)})()
-    (written,) = write_figures(content_of_one, tmp_path / "figures")
+def test_figures_are_written_as_pictures_and_as_specifications(
+    content: Content, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    few = list(render.pictures(content))[:1]
+    monkeypatch.setattr(render, "pictures", lambda _: iter(few))
+    (written,) = write_figures(content, tmp_path / "figures")
     assert written.read_bytes().startswith(b"\x89PNG")
     assert "<svg" in written.with_suffix(".svg").read_text()
     assert json.loads((tmp_path / "figures" / f"{few[0].name}.vl.json").read_text())["title"]

@@ -65,7 +65,9 @@ BROKEN = {
     "hard-rippled-constant-frames": ("pass", GOOD, "detections of rounding errors"),
     "warns-of-nothing": ("import warnings; warnings.warn('slow')", GOOD, "UserWarning: slow"),
     "same-in-another-process": (
-        "return block.detections['tap'] > 20 + hash('a') % 10 + hash('b') % 7 + hash('c') % 5",
+        # Every detection by a coin of its own: that all fall alike under two seeds has a chance of 2**-100 and less.
+        "rows = block.detections; "
+        "return np.array([hash(f'{f} {t}') % 2 == 0 for f, t in zip(rows['frame'], rows['tap'], strict=True)], bool)",
         GOOD,
         "hash ",
     ),

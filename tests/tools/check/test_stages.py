@@ -174,7 +174,7 @@ BROKEN = {
         "profile: ",
     ),
     "same-in-another-process": (
-        stage("gain = hash('gain') % 1000", "return block.replace(profile=block.frames.amplitude * gain)"),
+        stage("gain = 1 + hash('gain') % 2**40", "return block.replace(profile=block.frames.amplitude * gain)"),
         "hash ",
     ),
     "inputs-unchanged": (stage("block.frames.preamble[:] *= 2", PROFILE), "attempt to write"),

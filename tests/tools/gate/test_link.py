@@ -43,30 +43,30 @@ def test_a_mistake_is_told_and_the_worker_goes_on(capture_file, side, tmp_path) 
 def test_a_mistake_in_another_environment_names_it(capture_file, tmp_path) -> None:
     said = (f'{{"protocol": {PROTOCOL}}}', '{"error": "no such detector"}')
     python = interpreter(tmp_path / "python", "\n".join(f"print({line!r}, flush=True)\ninput()" for line in said))
-    with Worker(python, 5.0) as worker, pytest.raises(SetUpError, match="/python: no such detector"):
+    with Worker(python, 60.0) as worker, pytest.raises(SetUpError, match="/python: no such detector"):
         join(worker, "a", Side("head", "nothing", {}, python), CaptureRef.of_file(capture_file), 100, 2)
 
 
 def test_a_missing_interpreter_is_named(tmp_path) -> None:
     with pytest.raises(SetUpError, match=r"bin/python: no Python interpreter to run: No such file"):
-        Worker(tmp_path / "bin/python", 5.0)
+        Worker(tmp_path / "bin/python", 60.0)
 
 
 def test_an_environment_without_uwbbench_is_told_what_to_install(tmp_path) -> None:
     words = "import sys\nsys.exit('No module named uwbbench.tools.gate')"
     with pytest.raises(SetUpError, match="install a uwbbench with gates there"):
-        Worker(interpreter(tmp_path / "python", words), 5.0)
+        Worker(interpreter(tmp_path / "python", words), 60.0)
 
 
 def test_another_protocol_is_refused_with_both_versions(tmp_path) -> None:
     words = 'print(\'{"protocol": 99, "uwbbench": "9.9"}\', flush=True)\ninput()'
     with pytest.raises(SetUpError, match=f"uwbbench 9.9 speaks version 99 .* this one version {PROTOCOL}"):
-        Worker(interpreter(tmp_path / "python", words), 5.0)
+        Worker(interpreter(tmp_path / "python", words), 60.0)
 
 
 def test_what_is_no_answer_is_refused(tmp_path) -> None:
     with pytest.raises(SetUpError, match="hello there"):
-        Worker(interpreter(tmp_path / "python", "print('hello there', flush=True)\ninput()"), 5.0)
+        Worker(interpreter(tmp_path / "python", "print('hello there', flush=True)\ninput()"), 60.0)
 
 
 def test_no_answer_in_time_is_an_error(tmp_path) -> None:
@@ -77,11 +77,11 @@ def test_no_answer_in_time_is_an_error(tmp_path) -> None:
 def test_a_worker_that_dies_says_how_and_its_last_words(tmp_path) -> None:
     words = "import sys, os\nsys.stderr.write('first\\nlast words\\n')\nsys.stderr.flush()\nos.kill(os.getpid(), 9)"
     with pytest.raises(SetUpError, match=r"killed by signal 9\): last words"):
-        Worker(interpreter(tmp_path / "python", words), 5.0)
+        Worker(interpreter(tmp_path / "python", words), 60.0)
 
 
 def test_another_environment_does_not_inherit_paths_into_this_one(tmp_path, monkeypatch) -> None:
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
     words = "import os, sys\nsys.exit('path ' + os.environ.get('PYTHONPATH', 'unset'))"
     with pytest.raises(SetUpError, match="path unset"):
-        Worker(interpreter(tmp_path / "python", words), 5.0)
+        Worker(interpreter(tmp_path / "python", words), 60.0)

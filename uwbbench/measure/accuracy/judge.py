@@ -233,6 +233,12 @@ class Verdict:
     outcome : Outcome
     true_empty, duplicates, structure, unmatched : int
     chance_recall : float
+    retained : Detections
+        Those that were judged, in the order of ``outcome.error_m``.
+    stray : (retained,) bool array
+        Those that are neither true nor set aside as structure.
+    found : (frames, objects) bool array
+        Visible obstacles that a true detection belongs to; in ``frame`` and ``peak`` all within its gate.
     """
 
     outcome: Outcome
@@ -241,6 +247,9 @@ class Verdict:
     structure: int
     unmatched: int
     chance_recall: float
+    retained: Detections
+    stray: BoolArray
+    found: BoolArray
 
 
 def judge(detections: Detections, scene: Scene, rules: ScoringRules, table: Table) -> Verdict:
@@ -278,17 +287,19 @@ def judge(detections: Detections, scene: Scene, rules: ScoringRules, table: Tabl
     signed_m = _nearest(error_m, seen)
     signed_m = np.where(np.isnan(signed_m), _nearest(error_m, np.broadcast_to(scene.obstacle, near.shape)), signed_m)
     wall = duplicate = np.zeros(len(kept), bool)
+    found = np.zeros_like(visible)
     if rules.scoring == "object":
         partner = match_frames(kept.frame, np.where(seen, np.abs(error_m), np.nan), rules.gate_m)
         matched = partner >= 0
         signed_m[matched] = error_m[matched, partner[matched]]
         wall = ~matched & (near & ~scene.obstacle).any(axis=1)
         signed_m[wall] = np.nan
-        taken = np.zeros_like(visible)
-        taken[kept.frame[matched], partner[matched]] = True
-        duplicate = ~matched & ~wall & (near & taken[kept.frame]).any(axis=1)
+        found[kept.frame[matched], partner[matched]] = True
+        duplicate = ~matched & ~wall & (near & found[kept.frame]).any(axis=1)
     else:
         matched = np.asarray((near & seen).any(axis=1))
+        row, column = np.nonzero(near & seen)
+        found[kept.frame[row], column] = True
     stray = ~matched & ~wall
     if not exhaustive:
         signed_m[~matched] = np.nan
@@ -320,6 +331,9 @@ def judge(detections: Detections, scene: Scene, rules: ScoringRules, table: Tabl
         structure=int(wall.sum()),
         unmatched=0 if exhaustive else int(stray.sum()),
         chance_recall=_chance_recall(retained, scene, rules) if table == "filtering" else math.nan,
+        retained=kept,
+        stray=stray,
+        found=found,
     )
 
 

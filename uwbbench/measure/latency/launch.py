@@ -84,7 +84,7 @@ def measure(ref: CaptureRef, detector: DetectorConfig, settings: LatencyModel | 
         )
     except subprocess.TimeoutExpired:
         raise LatencyError(f"detector '{detector.name}' was not timed within {settings.timeout_s:g} s") from None
-    if done.returncode != 0:
+    if done.returncode != 0 or not done.stdout:  # a plugin may end the process as if all were well
         raise _failure(detector.name, done)
     return Latency.from_dict(json.loads(done.stdout))
 

@@ -83,7 +83,7 @@ def _grown(
     def run(most: int, limit_s: float) -> int:
         until = perf_counter() + limit_s
         done = 0
-        while done < most and perf_counter() < until:
+        while done < most and (perf_counter() < until or not done):  # one at least, whoever has the core meanwhile
             frame = next(coming)
             step(receive(frame, frame + 1, sts=sts)).records()
             done += 1

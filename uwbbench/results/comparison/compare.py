@@ -9,7 +9,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from uwbbench.api.errors import ConfigError, nearest
-from uwbbench.measure.accuracy.metrics.choice import MetricChoice
+from uwbbench.api.text import printable
+from uwbbench.config.detector import from_results, marked
+from uwbbench.measure.accuracy.metrics.choice import MetricChoice, combined
 from uwbbench.results.comparison.changes import Change, changes
 from uwbbench.results.comparison.flips import Flip, flips
 from uwbbench.results.comparison.scores import ScoreChange, TimeChange, score_changes, time_changes
@@ -18,6 +20,7 @@ from uwbbench.results.report import read_safely
 from uwbbench.run.folder.folder import RunFolder
 
 MOST_FLIPS = 20
+LONGEST_NAME = 60
 
 
 @dataclass(frozen=True)
@@ -66,6 +69,12 @@ class Comparison:
         """Whether anything differs but measured times and the machine, which never repeat."""
         inputs = any(change.kind != "machine" for change in self.changes)
         return inputs or bool(self.changed_scores) or any(self.flip_counts.values()) or self._unequal
+
+    def label(self, detector: str) -> str:
+        """Name of a detector as tables show it, which say so where either run read its results from files."""
+        configs = [one for folder in (self.first, self.second) for one in folder.manifest["experiment"]["detectors"]]
+        read = any(one["name"] == detector and from_results(one) for one in configs)
+        return marked(printable(detector, LONGEST_NAME), results_file=read)
 
     @property
     def _unequal(self) -> bool:
@@ -123,9 +132,7 @@ def compare(first: RunFolder, second: RunFolder, scoring: str | None = None, mos
     with read_safely(first.path):
         rules = {rule.scoring: rule for rule in first.rules}
         settings = {**first.manifest["experiment"]["intervals"], "seed": first.manifest["experiment"]["seed"]}
-        metrics = MetricChoice(
-            [name for folder in (first, second) for name in folder.manifest["experiment"]["metrics"]]
-        )
+        metrics = combined([folder.manifest["experiment"]["metrics"] for folder in (first, second)])
     if scoring is not None and scoring not in rules:
         raise ConfigError(f"{first.path}: was not scored by '{scoring}'.{nearest(scoring, rules)}")
     rule = next(rule for name, rule in rules.items() if scoring in (None, name))

@@ -23,7 +23,7 @@ from typing import Any
 
 import numpy as np
 
-from uwbbench.measure.accuracy.metrics.choice import MetricChoice
+from uwbbench.measure.accuracy.metrics.choice import MetricChoice, combined
 from uwbbench.results.leaderboard.runs import Run
 from uwbbench.results.results import Scored
 from uwbbench.run.folder.identity import canonical, digest
@@ -111,7 +111,7 @@ class Suite:
     @cached_property
     def metrics(self) -> MetricChoice:
         """Metrics that its runs show; what the newest run lists comes first."""
-        return MetricChoice([name for run in reversed(self.runs) for name in run.experiment["metrics"]])
+        return combined([run.experiment["metrics"] for run in reversed(self.runs)])
 
     @property
     def datasets(self) -> list[str]:

@@ -5,6 +5,7 @@
 ``journal.jsonl``               one line for each finished unit
 ``detections/UNIT.parquet``     what a detector found on a capture
 ``candidates/UNIT.parquet``     peaks before the filters, where ``peak`` scoring was asked for
+``curves/UNIT.parquet``        what it would find at every threshold of its score
 ``captures/ID.json, .parquet``  a capture without its samples: radar, poses, truth
 ``times/UNIT.parquet``          time of every call of a latency pass
 ``scores.parquet``              one row for each detector, capture, scoring and table
@@ -27,6 +28,7 @@ from uwbbench.api.arrays import FloatArray
 from uwbbench.api.capture import CaptureHeader
 from uwbbench.api.detections import Detections
 from uwbbench.api.errors import StoreError
+from uwbbench.measure.accuracy.ranked import RankedCounts
 from uwbbench.measure.accuracy.scoring import Region, ScoringRules
 from uwbbench.run.folder import journal, tables
 from uwbbench.run.folder.files import disk_errors, read_json, read_parquet, write_json, write_parquet, write_text
@@ -114,7 +116,7 @@ class RunFolder:
 
     def result_files(self) -> list[str]:
         """Files that hold results, by their path in the folder; reports are made of these."""
-        folders = ("captures", "detections", "candidates", "times")
+        folders = ("captures", "detections", "candidates", "curves", "times")
         with disk_errors(self.path, "read"):
             files = [path for name in folders for path in (self.path / name).glob("*") if path.is_file()]
             files += [path for name in ("journal.jsonl", "scores.parquet") if (path := self.path / name).is_file()]
@@ -159,6 +161,27 @@ class RunFolder:
         """Read what a detector found, with the candidates if they were stored."""
         candidates = self._file("candidates", unit)
         return tables.read_detections(self._file("detections", unit), candidates if candidates.is_file() else None)
+
+    def write_curve(self, unit: str, counts: RankedCounts, rules: ScoringRules) -> None:
+        """Store what a detector would find at every threshold of its score.
+
+        Parameters
+        ----------
+        unit : str
+            Identifier of the unit.
+        counts : RankedCounts
+        rules : ScoringRules
+            Their gate and region gave the counts.
+        """
+        tables.write_curve(self._file("curves", unit), counts, curve_rules(rules))
+
+    def curve(self, unit: str, rules: ScoringRules) -> RankedCounts | None:
+        """What a detector would find at every threshold; None where that is not known for this gate and region."""
+        path = self._file("curves", unit)
+        if not path.is_file():
+            return None
+        counts, stored = tables.read_curve(path)
+        return counts if stored == curve_rules(rules) else None
 
     # Captures --------------------------------------------------------------------------------------------------
 
@@ -267,6 +290,11 @@ class RunFolder:
 
     def _file(self, kind: str, unit: str) -> Path:
         return self.path / kind / f"{_safe(unit)}.parquet"
+
+
+def curve_rules(rules: ScoringRules) -> dict[str, Any]:
+    """Gate and region, all that curves depend on, as plain values."""
+    return {"gate_m": rules.gate_m, "region": dataclasses.asdict(rules.region)}
 
 
 def _safe(identifier: str) -> str:

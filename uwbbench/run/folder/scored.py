@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
@@ -9,13 +10,20 @@ from typing import Any
 from uwbbench.api.capture import CaptureHeader
 from uwbbench.api.detections import Detections
 from uwbbench.api.errors import PluginError, ScoringError
+from uwbbench.api.interruption import by_plugin
 from uwbbench.api.metric import Metric, Outcome
 from uwbbench.config.rules import RegionModel
-from uwbbench.measure.accuracy.metrics.choice import MetricChoice
+from uwbbench.measure.accuracy.causes import Causes, causes
+from uwbbench.measure.accuracy.judge import Scene
+from uwbbench.measure.accuracy.metrics.choice import MetricChoice, Metrics, names_of
 from uwbbench.measure.accuracy.scoring import Region, ScoringRules, outcomes, score
 from uwbbench.measure.accuracy.stats import evaluate
 from uwbbench.run.folder.folder import RunFolder
+from uwbbench.run.folder.identity import canonical
 from uwbbench.run.folder.journal import Entry
+
+CAUSES = "causes"
+"""Column of scores that holds where errors come from."""
 
 
 def rules_of(experiment: Mapping[str, Any]) -> tuple[ScoringRules, ...]:
@@ -57,11 +65,43 @@ def score_rows(detections: Detections, header: CaptureHeader, rules: Iterable[Sc
     return rows
 
 
+def with_causes(
+    rows: Iterable[Mapping[str, Any]], detections: Detections, header: CaptureHeader, rules: Iterable[ScoringRules]
+) -> list[dict[str, Any]]:
+    """Rows with the causes of their errors, as JSON text under ``causes``.
+
+    Parameters
+    ----------
+    rows : iterable of mapping
+        Of :func:`score_rows`; those that are not scored stay as they are, and so do those by the latest answer, whose
+        errors may be those of another frame.
+    detections : Detections
+        With their candidates; without them the causes of misses are not known.
+    header : CaptureHeader
+    rules : iterable of ScoringRules
+        That gave the rows.
+    """
+    by_name = {rule.scoring: rule for rule in rules}
+    completed = [dict(row) for row in rows]
+    scored = [row for row in completed if row["status"] == "scored" and row["scoring"] != "latest"]
+    scene = Scene.of(detections, header) if scored else None
+    for row in scored:
+        if scene is not None:
+            row[CAUSES] = canonical(causes(detections, scene, by_name[row["scoring"]], row["table"]).to_dict())
+    return completed
+
+
+def causes_of(row: Mapping[str, Any]) -> Causes | None:
+    """Causes of the errors of a stored row; None where an earlier version stored none."""
+    text = row.get(CAUSES)
+    return Causes(**json.loads(text)) if isinstance(text, str) else None
+
+
 def with_metrics(
     folder: RunFolder,
     rows_of: Mapping[str, list[dict[str, Any]]],
     rules: Sequence[ScoringRules],
-    listed: Sequence[str],
+    chosen: Metrics,
 ) -> dict[str, list[dict[str, Any]]]:
     """Rows with values of the metrics that an experiment lists, where these are installed.
 
@@ -73,7 +113,8 @@ def with_metrics(
         Rows of units that were done, of :func:`score_rows`.
     rules : sequence of ScoringRules
         That gave the rows.
-    listed : sequence of str
+    chosen : sequence or mapping
+        As the experiment has them.
 
     Raises
     ------
@@ -82,7 +123,7 @@ def with_metrics(
     StoreError
         If stored detections are missing or broken.
     """
-    metrics = MetricChoice(listed)
+    metrics, listed = MetricChoice(chosen), names_of(chosen)
     columns = {name: column_of(name, metrics[name].unit) for name in listed if name not in metrics.absent}
     completed = {unit: list(rows) for unit, rows in rows_of.items()}
     for entry in folder.entries() if columns else ():
@@ -103,7 +144,9 @@ def with_metrics(
 def _value(name: str, metric: type[Metric], outcome: Outcome) -> float | None:
     try:
         value = evaluate(metric, [outcome])
-    except Exception as error:
+    except BaseException as error:
+        if not by_plugin(error):
+            raise
         raise PluginError(
             f"metric '{name}' fails: {type(error).__name__}: {error}; what was detected is stored: mend the metric and "
             "continue the run with --resume"

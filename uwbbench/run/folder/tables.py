@@ -1,8 +1,8 @@
-"""Detections and capture headers as Parquet tables and JSON."""
+"""Detections, curves and capture headers as Parquet tables and JSON."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +13,7 @@ from uwbbench.api.capture import CaptureHeader
 from uwbbench.api.detections import HANDED_OUT, Detections
 from uwbbench.api.radar import Radar
 from uwbbench.api.truth import Obstacle, Trajectory, Truth
+from uwbbench.measure.accuracy.ranked import RankedCounts
 from uwbbench.run.folder.files import read_json, read_parquet, write_json, write_parquet
 
 
@@ -66,6 +67,31 @@ def read_detections(path: Path, candidates: Path | None = None) -> Detections:
     if answered is None:
         return read
     return read.with_hand_outs(columns[HANDED_OUT], read.processed if answered == "at once" else answered)
+
+
+def write_curve(path: Path, counts: RankedCounts, rules: Mapping[str, Any]) -> None:
+    """Store what a detector would give at every threshold.
+
+    Parameters
+    ----------
+    path : Path
+    counts : RankedCounts
+    rules : mapping
+        Gate and region that gave them.
+    """
+    import pyarrow as pa
+
+    columns = {"score": counts.score, "tp": counts.tp.astype(np.int32), "fp": counts.fp.astype(np.int32)}
+    keys = ("there", "duration_s", "order", "set_tp", "set_fp", "exhaustive")
+    write_parquet(path, pa.table(columns), {"counts": {key: getattr(counts, key) for key in keys}, "rules": rules})
+
+
+def read_curve(path: Path) -> tuple[RankedCounts, Mapping[str, Any]]:
+    """What a detector would give at every threshold, and the gate and region that gave it."""
+    table, facts = read_parquet(path)
+    score, tp, fp = (table.column(name).to_numpy() for name in ("score", "tp", "fp"))
+    counts = RankedCounts(score, tp.astype(np.int64), fp.astype(np.int64), **facts["counts"])
+    return counts, facts["rules"]
 
 
 def write_header(stem: Path, header: CaptureHeader, sha256: str) -> None:

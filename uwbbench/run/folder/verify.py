@@ -22,8 +22,8 @@ import numpy as np
 
 from uwbbench.api.errors import UwbbenchError
 from uwbbench.api.text import one_line, printable
-from uwbbench.config.detector import detector_identity
-from uwbbench.measure.accuracy.metrics.choice import MetricChoice
+from uwbbench.config.detector import RESULTS, detector_identity, from_results
+from uwbbench.measure.accuracy.metrics.choice import MetricChoice, names_of
 from uwbbench.run.folder.folder import RunFolder
 from uwbbench.run.folder.identity import (
     accuracy_identity,
@@ -35,7 +35,8 @@ from uwbbench.run.folder.identity import (
     unit_name,
 )
 from uwbbench.run.folder.journal import Entry
-from uwbbench.run.folder.scored import column_of, rules_of, score_rows, table_of, with_metrics
+from uwbbench.run.folder.reported import REPORTED_FACT, RESULTS_FACT, reported_times
+from uwbbench.run.folder.scored import causes_of, column_of, rules_of, score_rows, table_of, with_metrics
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -211,7 +212,7 @@ class _Verifier:
     def _accuracy(self, entry: Entry) -> None:
         sha256 = self._content(entry)
         rules = rules_of(self.manifest["experiment"])
-        self._identity(entry, [accuracy_identity(self.manifest["detectors"][entry.detector], sha256, rules)])
+        self._identity(entry, [accuracy_identity(self._detector_of(entry), sha256, rules)])
         detections, header = self.folder.detections(entry.unit), self.folder.header(entry.capture_id)
         counts = {"frames": len(header), "processed": len(detections.processed), "detections": len(detections)}
         for name, count in counts.items():
@@ -223,9 +224,21 @@ class _Verifier:
             self._problem(f"journal.jsonl, {_about(entry)}", f"its capture is {header.source}")
         again = score_rows(detections, header, rules)
         self._same(f"journal.jsonl, {_about(entry)}", entry.scores, again)
+        for row in entry.scores:
+            self._causes(f"journal.jsonl, {_about(entry)}", row)
         stored = self.folder.rules
         self.sound[entry.unit] = again if stored == list(rules) else score_rows(detections, header, stored)
         self._count("units scored again")
+        if REPORTED_FACT in entry.facts:
+            times = reported_times(self.folder.times_us(entry.unit))
+            self._same(f"journal.jsonl, {_about(entry)}", [entry.facts[REPORTED_FACT]], [times])
+
+    def _detector_of(self, entry: Entry) -> str:
+        """Identity of the detector; where results were read, by what was read for this unit."""
+        config = next(c for c in self.manifest["experiment"]["detectors"] if c["name"] == entry.detector)
+        if not from_results(config):
+            return str(self.manifest["detectors"][entry.detector])
+        return detector_identity(config, {f"{RESULTS}{entry.detector}": entry.facts[RESULTS_FACT]["sha256"]})
 
     def _latency(self, entry: Entry) -> None:
         sha256 = self._content(entry) if entry.capture_id else ""
@@ -260,15 +273,18 @@ class _Verifier:
         """Every detector in every way that any of them was measured: a line that somebody took out is missed."""
         experiment, detectors = self.manifest["experiment"], self.manifest["detectors"]
         units = {(e.kind, e.detector, e.dataset, e.capture) for e in self.entries if e.kind != "listing"}
+        read_only = {config["name"] for config in experiment["detectors"] if from_results(config)}
         expected = {(kind, dataset, capture) for kind, _, dataset, capture in units}
         if experiment["stability"]:
             expected.add(("stability", "", ""))
-        if experiment["latency"]["enabled"]:
+        if experiment["latency"]["enabled"] and set(detectors) > read_only:
             timed = {unit[2] for unit in units if unit[0] == "latency"}
             for dataset in sorted({unit[2] for unit in units if unit[0] == "accuracy"} - timed):
                 self._problem("journal.jsonl", f"no line about times on {_shown(dataset)}")
         for kind, dataset, capture in sorted(expected):
             for detector in detectors:
+                if detector in read_only and kind != "accuracy":
+                    continue
                 if (kind, detector, dataset, capture) not in units:
                     about = " ".join(_shown(name) for name in (kind, detector, dataset, capture) if name)
                     self._problem("journal.jsonl", f"no line about {about}")
@@ -294,11 +310,20 @@ class _Verifier:
                     self._problem(where, "no unit gave this row")
                 else:
                     self._same(where, [stored[key]], [expected[key]])
+                    self._causes(where, stored[key])
                 self._count("rows of scores")
+
+    def _causes(self, where: str, row: Mapping[str, Any]) -> None:
+        """Causes against the errors that they explain; those of misses cannot be made again without candidates."""
+        stored = causes_of(row)
+        counts = {} if stored is None else {"fn": stored.misses, "fp": stored.false}
+        for name, parts in counts.items():
+            if sum(parts.values()) != row[name]:
+                self._problem(where, f"the causes of {name} add up to {sum(parts.values())}, not to {row[name]}")
 
     def _stored_metrics(self, table: pd.DataFrame) -> list[str]:
         """Listed metrics that were stored, which version 0.1.0 did not, and are installed."""
-        listed: list[str] = self.manifest["experiment"]["metrics"]
+        listed = names_of(self.manifest["experiment"]["metrics"])
         metrics = MetricChoice(listed)
         self.notes += [
             f"metric {_shown(name)} is not installed: its values were not checked" for name in metrics.absent

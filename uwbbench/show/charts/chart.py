@@ -4,7 +4,7 @@ Conventions
 -----------
 * A specification holds its data and its title, and nothing about colours of paper and ink: those are the theme's.
 * Every chart of simulated captures says so in its title.
-* A detector keeps its colour, marker and dash through a whole report.
+* A detector has the colour and the mark that :mod:`uwbbench.show.looks` gives it.
 * Numbers are in the units that people read: cm, us, per cent.
 """
 
@@ -14,7 +14,7 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from uwbbench.show.charts.theme import DASHES, SERIES, SHAPES
+from uwbbench.show.looks import looks
 
 Spec = dict[str, Any]
 
@@ -52,45 +52,53 @@ def chart(title: str, subtitle: str, layers: list[Spec], **more: Any) -> Spec:
 
 
 class Series:
-    """How the detectors of a chart look: each as in every other chart of the report.
+    """How the detectors of a chart look: each as in every other chart and table of the report.
 
     Parameters
     ----------
     names : mapping of str to str
-        Labels of all detectors, in the order of the experiment.
+        Labels of all detectors, in the order of their looks.
     shown : collection of str
         Labels of those in this chart.
     """
 
     def __init__(self, names: Mapping[str, str], shown: Iterable[str]) -> None:
         present = set(shown)
-        self._places = {label: place for place, label in enumerate(names.values()) if label in present}
+        self._looks = {label: look for label, look in looks(names.values()).items() if label in present}
 
     @property
     def detectors(self) -> list[str]:
-        """Labels in the order of the experiment."""
-        return list(self._places)
+        """Labels in the order of their looks."""
+        return list(self._looks)
 
-    def encoding(self, legend: Spec | None, *channels: str) -> Spec:
-        """Encoding of a detector by colour, and by ``shape`` or ``strokeDash`` where asked."""
-        looks: dict[str, Sequence[Any]] = {"color": SERIES, "shape": SHAPES, "strokeDash": DASHES}
+    def encoding(self, *, legend: bool = True) -> Spec:
+        """Encoding of a detector by its colour and its mark.
+
+        Parameters
+        ----------
+        legend : bool
+            Whether the layer has a part in the legend.
+        """
+        scales = {
+            "color": [look.colour for look in self._looks.values()],
+            "shape": [look.shape for look in self._looks.values()],
+        }
         return {
             channel: {
                 "field": "detector",
                 "type": "nominal",
                 "title": None,
-                "legend": legend,
-                "scale": {
-                    "domain": self.detectors,
-                    "range": [looks[channel][place % len(looks[channel])] for place in self._places.values()],
-                },
+                "legend": LEGEND if legend else None,
+                "scale": {"domain": self.detectors, "range": values},
             }
-            for channel in ("color", *channels)
+            for channel, values in scales.items()
         }
 
 
-LEGEND: Spec = {"orient": "bottom", "direction": "horizontal", "columns": 4, "labelLimit": 220, "title": None}
-LINES: Spec = {**LEGEND, "symbolType": "stroke", "symbolSize": 500}
+LEGEND: Spec = {"orient": "bottom", "direction": "horizontal", "columns": 5, "labelLimit": 220, "title": None}
+
+PLAIN_NUMBERS = ",.6~r"
+"""Format of axes: 2 and 0.05, never 2e+0."""
 
 
 def axis(field: str, title: str, **more: Any) -> Spec:
@@ -114,7 +122,7 @@ def deadline(at: float, text: str, x: Spec) -> Spec:
     at : float
         Place on the axis of times, in its unit; nothing is drawn where it is not finite.
     text : str
-        Written beside the line.
+        Written above the line, outside the plot: no curve can cover it.
     x : dict
         Scale and other keys of that axis, so that the layer shares it.
     """
@@ -126,8 +134,8 @@ def deadline(at: float, text: str, x: Spec) -> Spec:
                 "encoding": {"x": axis("at", "", **x)},
             },
             {
-                "mark": {"type": "text", "align": "right", "dx": -5, "baseline": "top", "style": "note"},
-                "encoding": {"x": axis("at", "", **x), "y": {"value": 4}, "text": {"field": "text"}},
+                "mark": {"type": "text", "align": "right", "dx": 3, "baseline": "bottom", "style": "note"},
+                "encoding": {"x": axis("at", "", **x), "y": {"value": -4}, "text": {"field": "text"}},
             },
         ],
     }

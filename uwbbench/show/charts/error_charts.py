@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 
 from uwbbench.results.curves import ErrorCurve, error_axis
 from uwbbench.results.slices import Slice
-from uwbbench.show.charts.chart import LEGEND, LINES, Series, Spec, axis, chart
+from uwbbench.show.charts.chart import PLAIN_NUMBERS, Series, Spec, axis, chart
 from uwbbench.show.text.numbers import number
 from uwbbench.show.text.quantity import Quantity
 
@@ -45,7 +45,7 @@ def by_range(title: str, slices: Sequence[Slice], spans: Sequence[str], names: M
                 }
             )
     series = Series(names, [row["detector"] for row in rows])
-    look = series.encoding(LEGEND, "shape")
+    look = series.encoding()
     place = {
         "x": {
             "field": "span",
@@ -73,7 +73,7 @@ def by_range(title: str, slices: Sequence[Slice], spans: Sequence[str], names: M
             "encoding": {**place, "y": axis("low", by.axis, **y), "y2": {"field": "high"}, "color": look["color"]},
         },
         {
-            "mark": {"type": "point", "filled": True, "size": 48, "opacity": 1},
+            "mark": {"type": "point", "filled": True, "size": 70, "opacity": 1},
             "encoding": {**place, "y": up, **look, "tooltip": tooltip},
         },
     ]
@@ -115,9 +115,9 @@ def error_cdf(title: str, curves: Mapping[str, ErrorCurve], names: Mapping[str, 
             if not math.isnan(value)
         ]
     series = Series(names, [row["detector"] for row in rows])
-    look = series.encoding(LINES, "strokeDash")
+    look = series.encoding()
     scale = {"type": "log" if logarithmic else "linear", "domain": [least, far], "nice": False}
-    x = axis("error", "Absolute error (cm)", scale=scale, axis={"format": "~g", "tickCount": 8})
+    x = axis("error", "Absolute error (cm)", scale=scale, axis={"format": PLAIN_NUMBERS, "tickCount": 8})
     y = axis(
         "share",
         "Share of detections",
@@ -128,12 +128,12 @@ def error_cdf(title: str, curves: Mapping[str, ErrorCurve], names: Mapping[str, 
     layers: list[Spec] = [
         {
             "mark": {"type": "line", "strokeWidth": 1.8, "clip": True},
-            "encoding": {"x": x, "y": y, **look},
+            "encoding": {"x": x, "y": y, "color": look["color"]},
         },
         {
             "data": {"values": points},
-            "mark": {"type": "point", "filled": True, "size": 52, "clip": True, "opacity": 1},
-            "encoding": {"x": x, "y": y, "color": look["color"], "tooltip": tooltip},
+            "mark": {"type": "point", "filled": True, "size": 70, "clip": True, "opacity": 1},
+            "encoding": {"x": x, "y": y, **look, "tooltip": tooltip},
         },
     ]
     return chart(title, "All retained detections. Points: median, P90 and P95.", layers, data={"values": rows})

@@ -9,8 +9,11 @@ import numpy as np
 from uwbbench.api.arrays import FloatArray
 from uwbbench.results.cases import Case
 from uwbbench.show.charts.chart import Spec, axis, chart, limits
-from uwbbench.show.charts.theme import SERIES
+from uwbbench.show.looks import SERIES
 from uwbbench.show.text.numbers import rounded
+
+DETECTOR = "{detector}"
+"""Stands in a title for the detector that is shown, as the reader may choose another one."""
 
 NEAR = {True: "within the gate", False: "elsewhere"}
 
@@ -48,14 +51,6 @@ def radargram(title: str, case: Case, image: tuple[str, float] | None, names: Ma
         stretched: Spec = {"width": {"expr": "width"}, "height": {"expr": "height"}, "x": 0, "y": 0, "aspect": False}
         mark = {"type": "image", "url": image[0], "align": "left", "baseline": "top", **stretched}
         layers.append({"data": {"values": [{}]}, "mark": mark})
-    layers += [
-        {
-            "data": {"values": truth},
-            "mark": {"type": "line", "clip": True, "style": look},
-            "encoding": {"x": x, "y": y, "detail": {"field": "object"}},
-        }
-        for look in ("halo", "range")
-    ]
     tooltip = [
         {"field": "detector", "title": "Detector"},
         {"field": "near", "title": "Detection"},
@@ -66,10 +61,18 @@ def radargram(title: str, case: Case, image: tuple[str, float] | None, names: Ma
         {
             "data": {"values": detections},
             "transform": [{"filter": "datum.detector === detector"}],
-            "mark": {"type": "point", "size": 9, "opacity": 0.95, "clip": True, "filled": True},
+            "mark": {"type": "point", "size": 30, "opacity": 0.8, "clip": True, "filled": True},
             "encoding": {"x": x, "y": y, **_nearness(), "tooltip": tooltip},
         }
     )
+    layers += [  # above the detections, thinner than they are wide: neither hides the other
+        {
+            "data": {"values": truth},
+            "mark": {"type": "line", "clip": True, "style": look},
+            "encoding": {"x": x, "y": y, "detail": {"field": "object"}},
+        }
+        for look in ("halo", "range")
+    ]
     samples = "grey: amplitude, 50 dB down to white" if image else "the samples are not at hand"
     return chart(title, f"Green line: true range; {samples}.", layers, params=[_chosen(names[case.leader])])
 
@@ -106,23 +109,28 @@ def top_view(title: str, case: Case, names: Mapping[str, str]) -> Spec:
     tall, middle = max(up[1] - up[0], (across[1] - across[0]) / 2.2), (up[0] + up[1]) / 2
     x = axis("x", "x (m)", scale={"domain": across, "nice": False, "zero": False})
     y = axis("y", "y (m)", scale={"domain": [middle - tall / 2, middle + tall / 2], "nice": False, "zero": False})
-    layers: list[Spec] = [
-        {
+    drawn = {
+        kind: {
             "data": {"values": [line for line in lines if line["kind"] == kind]},
             "mark": {"type": "line", "style": kind, "clip": True},
             "encoding": {"x": x, "y": y, "order": {"field": "order"}, "detail": {"field": "line"}},
         }
         for kind in ("structure", "path", "truth")
-    ]
-    layers.append(
-        {
-            "data": {"values": detections},
-            "transform": [{"filter": "datum.detector === detector"}],
-            "mark": {"type": "point", "size": 16, "opacity": 0.9, "filled": True, "clip": True},
-            "encoding": {"x": x, "y": y, **_nearness()},
-        }
-    )
-    return chart(title, "Line: true outline; dashed: robot path.", layers, params=[_chosen(names[placing(case)])])
+    }
+    points: Spec = {
+        "data": {"values": detections},
+        "transform": [{"filter": "datum.detector === detector"}],
+        "mark": {"type": "point", "size": 22, "opacity": 0.5, "filled": True, "clip": True},
+        "encoding": {"x": x, "y": y, **_nearness()},
+    }
+    layers = [drawn["structure"], drawn["path"], points, drawn["truth"]]
+    return chart(title, "Green line: true outline; dashed: robot path.", layers, params=[_chosen(names[placing(case)])])
+
+
+def titled(spec: Spec) -> Spec:
+    """Chart whose title names the detector that is shown at first."""
+    head = spec["title"]
+    return {**spec, "title": {**head, "text": head["text"].replace(DETECTOR, spec["params"][0]["value"])}}
 
 
 def placing(case: Case) -> str:

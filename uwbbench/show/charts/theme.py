@@ -1,15 +1,10 @@
-"""Colours and type of charts: one palette that colour-blind readers can distinguish, on light and on dark paper."""
+"""Type and colours of charts on light and on dark paper."""
 
 from __future__ import annotations
 
 from typing import Any
 
-SERIES = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#7A7A7A")
-"""The palette of Okabe and Ito, Color Universal Design (2008), without its yellow and with grey for its black."""
-
-SHAPES = ("circle", "square", "triangle-up", "diamond", "triangle-down", "cross", "triangle-right", "triangle-left")
-DASHES: tuple[list[int], ...] = ([1, 0], [7, 3], [2, 2], [8, 3, 2, 3], [12, 3], [1, 3], [5, 2, 1, 2, 1, 2])
-"""Eight markers and seven dashes: a colour that comes back has another marker."""
+from uwbbench.show.looks import SERIES
 
 FONT = "system-ui, -apple-system, 'Segoe UI', Roboto, 'Helvetica Neue', Arial, sans-serif"
 
@@ -33,7 +28,7 @@ def config(*, ink: str, soft: str, line: str, paper: str) -> dict[str, Any]:
             "fontSize": 13,
             "fontWeight": 600,
             "subtitleFontSize": 11.5,
-            "offset": 12,
+            "offset": 18,
             "subtitlePadding": 4,
         },
         "axis": {
@@ -59,9 +54,11 @@ def config(*, ink: str, soft: str, line: str, paper: str) -> dict[str, Any]:
             "label": {"color": ink, "fontSize": 11.5},
             "note": {"color": soft, "fontSize": 11},
             "deadline": {"color": soft, "strokeWidth": 1.2},
+            "bound": {"color": ink, "strokeWidth": 2.4, "strokeDash": [7, 4]},
+            "asked": {"color": ink},
             "front": {"color": soft, "strokeWidth": 1.2},
-            "halo": {"color": paper, "strokeWidth": 5.5},
-            "range": {"color": SERIES[2], "strokeWidth": 3.5},
+            "halo": {"color": paper, "strokeWidth": 3.2},
+            "range": {"color": SERIES[2], "strokeWidth": 1.6},
             "truth": {"color": SERIES[2], "strokeWidth": 2.2},
             "structure": {"color": soft, "strokeWidth": 1.0},
             "path": {"color": soft, "strokeWidth": 1.2, "strokeDash": [4, 3]},

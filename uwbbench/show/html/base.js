@@ -55,9 +55,32 @@ const base = (() => {
   }
   for (const table of document.querySelectorAll("table.sortable")) {
     const rows = table.tBodies[0].rows;
-    for (const row of rows) for (const cell of row.cells) if (typeof keyOf(cell) === "string" && !cell.querySelector("small")) cell.classList.add("text");
+    for (const row of rows) for (const cell of row.cells) if (typeof keyOf(cell) === "string" && !cell.querySelector("small")) {
+      cell.classList.add("text");
+      cell.classList.toggle("long", cell.textContent.length > 30);
+    }
     [...table.tHead.rows[0].cells].forEach((head, column) => head.classList.toggle("text", rows[0].cells[column].classList.contains("text")));
     sortable(table);
   }
-  return { root, make, sortBy, sortable };
+  // A table that is wider than the page says so: a shade at the edge where it goes on.
+  function edges(box) {
+    const inner = box.firstElementChild, rest = inner.scrollWidth - inner.clientWidth - inner.scrollLeft;
+    box.classList.toggle("more", rest > 2);
+    box.classList.toggle("moved", inner.scrollLeft > 2);
+  }
+  for (const box of document.querySelectorAll(".wide")) {
+    box.append(make("span", "scroll \u2192", { class: "hint", "aria-hidden": "true" }));
+    box.firstElementChild.addEventListener("scroll", () => edges(box), { passive: true });
+    const watch = new ResizeObserver(() => edges(box));
+    for (const part of [box, box.querySelector("table")]) watch.observe(part);
+  }
+  function markOf([path, colour]) {
+    const names = "http://www.w3.org/2000/svg", drawn = document.createElementNS(names, "svg"), shape = document.createElementNS(names, "path");
+    for (const [name, value] of [["class", "mark"], ["viewBox", "-8 -8 16 16"], ["aria-hidden", "true"]]) drawn.setAttribute(name, value);
+    shape.setAttribute("d", path);
+    shape.setAttribute("fill", colour);
+    drawn.append(shape);
+    return drawn;
+  }
+  return { root, make, sortBy, sortable, markOf };
 })();

@@ -2,7 +2,7 @@
   const read = (id) => JSON.parse(document.getElementById(id).textContent);
   const data = read("data"), config = read("theme-config");
   const at = (id) => document.getElementById(id);
-  const { root, make, sortBy, sortable } = base;
+  const { root, make, sortBy, sortable, markOf } = base;
 
   function fill(select, options, keep) {
     select.replaceChildren(...options.map(([value, text]) => make("option", text, { value })));
@@ -23,6 +23,11 @@
     }
     return lines;
   }
+  function fitLegends(part, columns) {
+    if (part === null || typeof part !== "object") return;
+    if (part.legend?.columns) part.legend.columns = columns;
+    for (const value of Object.values(part)) if (!Array.isArray(value) || value.length < 40) fitLegends(value, columns);
+  }
   async function draw(place, spec, why) {
     views.get(place)?.finalize();
     views.delete(place);
@@ -30,13 +35,18 @@
     if (!spec) { place.textContent = why; return null; }
     place.replaceChildren();
     const fitted = structuredClone(spec), letters = Math.max(24, Math.floor(place.clientWidth / 8.2));
-    fitted.title.text = wrapped(spec.title.text, letters);
-    fitted.title.subtitle = wrapped(spec.title.subtitle ?? "", letters * 1.12);
+    const head = { ...spec.title }, chosen = place.closest("figure").parentElement.querySelector("label.single select")?.value;
+    if (chosen !== undefined && spec.params) {
+      fitted.params[0].value = chosen;
+      head.text = head.text.replace("{detector}", () => chosen);
+    }
+    fitted.title.text = wrapped(head.text, letters);
+    fitted.title.subtitle = wrapped(head.subtitle ?? "", letters * 1.12);
+    fitLegends(fitted, Math.max(2, Math.floor(place.clientWidth / 170)));
     const made = await vegaEmbed(place, fitted, options);
     views.set(place, { ...made, finalize: made.finalize, source: spec });
     const picture = place.querySelector("svg");
     picture.setAttribute("role", "img");
-    const head = spec.title;
     picture.setAttribute("aria-label", head.text + ". " + (head.subtitle ?? ""));
     for (const part of picture.querySelectorAll("[role], [aria-roledescription], [aria-label]")) {
       for (const name of ["role", "aria-roledescription", "aria-label", "aria-hidden"]) part.removeAttribute(name);
@@ -49,12 +59,8 @@
     if (window.innerWidth === width) return;
     width = window.innerWidth;
     clearTimeout(timer);
-    timer = setTimeout(() => { for (const [place, { source }] of views) later(() => draw(place, source).then(() => choose(place))); }, 250);
+    timer = setTimeout(() => { for (const [place, { source }] of views) later(() => draw(place, source)); }, 250);
   });
-  function choose(place) {
-    const select = place.closest("article div:not(.chart)")?.querySelector("select");
-    return select && views.get(place).view.signal("detector", select.value).runAsync();
-  }
   let waiting = Promise.resolve();
   const later = (work) => { waiting = waiting.then(() => new Promise((go) => setTimeout(go, 0))).then(work); return waiting; };
 
@@ -85,16 +91,23 @@
     }
     const quantity = (name) => data.quantities.find((one) => one.name === name);
 
-    const timed = ["time ratio", "p50 (us)", "p99 (us)"];
     const counted = ["captures", "frames (n)", "detections (n)"];
+    const inserted = ([first, ...rest], times) => [first, ...times, ...rest];
     const headOf = (one) => one.unit ? `${one.title} (${one.unit})` : one.title;
-    const columnsOf = (board) => board.columns.map((name) => { const one = quantity(name); return { one, index: data.quantities.indexOf(one) }; });
+    const columnsOf = (board) => [board.main, ...board.columns.filter((name) => name !== board.main)].map((name) => { const one = quantity(name); return { one, index: data.quantities.indexOf(one) }; });
     function cellOf(value, low, high, digits, factor, title) {
       const cell = make("td", shown(value, digits, factor));
       cell.dataset.key = value === null ? "n/a" : String(value);
       if (value === null) cell.classList.add("na");
       if (low !== null && high !== null) cell.append(make("small", `[${shown(low, digits, factor)}, ${shown(high, digits, factor)}]`));
       if (title) cell.title = title;
+      return cell;
+    }
+    function timeCell([text, small, key, title]) {
+      const cell = make("td", text, { title });
+      cell.dataset.key = key === null ? "n/a" : String(key);
+      if (key === null) cell.classList.add("na");
+      if (small) cell.append(make("small", small));
       return cell;
     }
     function leaderboard() {
@@ -108,9 +121,11 @@
       const sorted = table.tHead ? [...table.tHead.rows[0].cells].find((head) => head.hasAttribute("aria-sort")) : null;
       const before = sorted && [sorted.textContent, sorted.getAttribute("aria-sort") === "descending"];
       const head = make("thead"), body = make("tbody"), line = make("tr");
-      line.append(make("th", "detector", { scope: "col" }));
-      for (const { one } of columns) line.append(make("th", headOf(one), { scope: "col", "data-first": one.better === "higher" ? "descending" : "ascending" }));
-      for (const name of [...timed, ...counted]) line.append(make("th", name, { scope: "col" }));
+      const scores = columns.map(({ one }) => [headOf(one), one.better === "higher" ? "descending" : "ascending"]);
+      const times = data.timed.map((name) => [name, "ascending"]);
+      for (const [name, first] of [["detector", "ascending"], ...inserted(scores, times), ...counted.map((name) => [name, "ascending"])]) {
+        line.append(make("th", name, { scope: "col", "data-first": first }));
+      }
       head.append(line);
       const best = columns.map(({ one, index }) => {
         const known = rows.filter((row) => row[8]).map((row) => row[7][index][0]).filter((value) => value !== null);
@@ -119,20 +134,18 @@
       });
       for (const row of rows) {
         const tr = make("tr"), values = row[7];
-        tr.append(make("th", data.detectors[row[4]], { scope: "row" }));
-        columns.forEach(({ one, index }, place) => {
+        const who = make("th", undefined, { scope: "row" });
+        who.append(markOf(data.marks[row[4]]), data.detectors[row[4]]);
+        tr.append(who);
+        const scored = columns.map(({ one, index }, place) => {
           const [value, low, high, n, groups] = values[index];
           const title = value === null ? "undefined here: nothing was retained, nothing was to be found, or too few samples" : `n = ${n} ${one.samples}, ${groups} groups`;
           const cell = cellOf(value, low, high, one.digits, one.factor, title);
           if (value !== null && value === best[place] && row[8]) cell.classList.add("best");
-          tr.append(cell);
+          return cell;
         });
-        const times = data.times[board.timing][row[4]];
-        if (times === null) for (const _ of timed) tr.append(make("td", "not timed", { class: "na" }));
-        else {
-          const [ratio, low, high, p50, p99, calls] = times;
-          tr.append(cellOf(ratio, low, high, 2, 1, `n = ${calls} calls`), cellOf(p50, null, null, 0, 1, `n = ${calls} calls`), cellOf(p99, null, null, 0, 1, "needs 368 calls"));
-        }
+        const times = data.times[board.timing][row[4]] ?? data.timed.map(() => ["not timed", "", null, ""]);
+        tr.append(...inserted(scored, times.map(timeCell)));
         for (const count of [row[5], row[6], row[9]]) tr.append(make("td", String(count)));
         body.append(tr);
       }
@@ -144,14 +157,13 @@
       if (rows.length) sortBy(table, column, before && heads.includes(before[0]) ? before[1] : first.better === "higher");
       at("board-note").textContent = rows.length ? `${rows.length} detectors, ${board.dataset}, ${board.scoring} scoring, ${board.table}.`
         : cut === undefined ? "No capture of this dataset has this channel with this material." : "No row fits these filters.";
-      at("board-missing").replaceChildren(...board.missing.map((text) => make("li", text)));
+      for (const kind of ["warnings", "missing"]) at("board-" + kind).replaceChildren(...board[kind].map((text) => make("li", text)));
     }
     function drawBoard() {
       const board = chosen(), number = numberOf(board), metric = at("metric").value;
-      const reasons = { pareto: "Nothing to draw: no detector was both timed against a reference and found anything here.", range: "Nothing to draw: the obstacles stay in one range bin, or each bin has too few samples.", cdf: "Nothing to draw: no detection has an error here." };
-      for (const kind of ["pareto", "range", "cdf"]) {
-        const spec = kind === "cdf" ? data.specs.cdf[number] : data.specs[kind][number][metric];
-        later(() => draw(document.querySelector(`[data-chart=${kind}]`), spec, reasons[kind]));
+      for (const place of document.querySelectorAll("[data-chart]")) {
+        const chart = data.charts[place.dataset.chart];
+        if (chart) later(() => draw(place, chart.specs[number][metric] ?? chart.specs[number][""], chart.empty));
       }
     }
     fill(at("dataset"), plain(distinct(data.boards.map((board) => board.dataset))));
@@ -163,13 +175,14 @@
     offer(); leaderboard(); drawBoard();
   }
   // Charts that do not depend on the board -------------------------------------------------------------------
-  for (const place of document.querySelectorAll("[data-chart=latency]")) later(() => draw(place, data.specs.latency[Number(place.dataset.index)]));
+  for (const place of document.querySelectorAll("[data-fixed]")) later(() => draw(place, data.fixed[place.dataset.fixed][Number(place.dataset.index)]));
   for (const look of document.querySelectorAll(".look")) {
-    const specs = data.specs.looks[Number(look.dataset.look)];
+    const specs = data.looks[Number(look.dataset.look)];
     for (const kind of ["radargram", "map"]) {
       const place = look.querySelector(`[data-chart=${kind}]`);
-      place.closest("div:not(.chart)").querySelector("select")?.addEventListener("change", () => choose(place));
-      later(() => draw(place, specs[kind]).then(() => choose(place)));
+      if (!place) continue;
+      place.closest("div:not(.chart)").querySelector("select")?.addEventListener("change", () => later(() => draw(place, specs[kind])));
+      later(() => draw(place, specs[kind]));
     }
   }
 

@@ -7,19 +7,23 @@ Expressions of charts are interpreted, not compiled, as the page's policy asks.
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from uwbbench.measure.accuracy.stats import MINIMUM_GROUPS
 from uwbbench.run.folder.files import replacing, write_json, write_text
+from uwbbench.show.charts import scene_charts
+from uwbbench.show.charts.chart import Spec
 from uwbbench.show.charts.theme import PAGE, PRINT
 from uwbbench.show.extras import report_tools
+from uwbbench.show.html.cell import Table, table_of
 from uwbbench.show.html.render import badge, document, embedded
 from uwbbench.show.page.content import Content
+from uwbbench.show.page.sections import sections
 from uwbbench.show.text.formats import INDEX, MARK
-from uwbbench.show.text.report import Tables
-from uwbbench.show.text.sheet import sentence, shown
+from uwbbench.show.text.sheet import Sheet, sentence, shown
 
 FIGURE_WIDTH = 620
 
@@ -36,34 +40,60 @@ def page(content: Content) -> str:
     manifest = report.folder.manifest
     session = manifest["sessions"][-1]
     name = shown(report.experiment["name"])
-    tables = _tables(Tables(report))
-    sources = {board[1] for board in content.boards}
+    sources = {one["source"] for one in report.captures}
+    parts = sections(content)
     return document(
         "page/page",
         _bundle(),
         generator=MARK,
-        badge=badge(sources or {one["source"] for one in report.captures}),
+        badge=badge(sources),
         name=name,
         simulated="simulated" in sources,
         lead=sentence(report.experiment["description"]),
-        sections=_sections(content, tables),
-        summary=content.summary(),
-        counts=_counts(content),
-        boards=bool(content.boards),
-        confidence=f"{report.experiment['intervals']['confidence']:.0%}",
-        resamples=report.experiment["intervals"]["resamples"],
-        minimum_groups=MINIMUM_GROUPS,
+        sections=[(part, _tables(content, part.sheets), _tables(content, part.folded)) for part in parts],
         looks=content.looks,
-        tables=tables,
-        latencies=content.timings,
-        notes=[sentence(note) for note in report.notes],
         facts=_facts(session, report.experiment),
-        timed=report.timed,
         manifest=json.dumps(manifest, indent=2, ensure_ascii=False),
         made=f"Made by uwbbench {session['versions']['uwbbench']} from a run started {session['started']}.",
-        data=embedded(content.data()),
+        data=embedded({**content.data(), "fixed": {part.id: part.charts for part in parts if part.charts}}),
         config=embedded(PAGE),
     )
+
+
+def _tables(content: Content, sheets: Sequence[Sheet]) -> list[Table]:
+    return [table_of(sheet, content.marks) for sheet in sheets]
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A chart with a name for its file.
+
+    Attributes
+    ----------
+    name : str
+    spec : dict
+        Vega-Lite.
+    """
+
+    name: str
+    spec: Spec
+
+
+def pictures(content: Content) -> Iterator[Picture]:
+    """Every chart that the page can show, with names for files."""
+    for kind, boards in content.board_charts.items():
+        for place, (board, charts) in enumerate(zip(content.boards, boards, strict=True)):
+            for metric, spec in charts.items():
+                if spec is not None:
+                    name = "-".join(part for part in (kind, str(place + 1), board[2], board[3], metric) if part)
+                    yield Picture(name, spec)
+    for section in sections(content):
+        for place, spec in enumerate(section.charts):
+            yield Picture(f"{section.id}-{place + 1}", spec)
+    for place, look in enumerate(content.looks):
+        for kind in ("radargram", "map"):
+            if look[kind] is not None:
+                yield Picture(f"{kind}-{place + 1}", scene_charts.titled(look[kind]))
 
 
 def write_figures(content: Content, folder: Path) -> list[Path]:
@@ -79,7 +109,7 @@ def write_figures(content: Content, folder: Path) -> list[Path]:
     with report_tools():
         import vl_convert
     written = []
-    for picture in content.pictures():
+    for picture in pictures(content):
         spec = {**picture.spec, "width": FIGURE_WIDTH, "config": {**PRINT, "background": "white"}}
         write_json(folder / f"{picture.name}.vl.json", spec)
         drawn = vl_convert.vegalite_to_svg(spec)
@@ -98,41 +128,6 @@ def _bundle() -> str:
         import vl_convert
     script: str = vl_convert.javascript_bundle()  # type: ignore[call-arg]  # its stub knows no default
     return script.replace("</script", "<\\/script").replace("<!--", "<\\!--")
-
-
-def _counts(content: Content) -> str:
-    report = content.report
-    captures = report.captures
-    licences = sorted({shown(one["license"]) for one in captures})
-    failed = f"{len(report.failures)} units failed" if report.failures else "no unit failed"
-    return (
-        f"{len(report.detectors)} detectors, {len(captures)} captures in {len(content.datasets)} datasets "
-        f"(licence: {', '.join(licences) or 'none'}), {sum(one['frames'] for one in captures)} frames; {failed}."
-    )
-
-
-def _tables(tables: Tables) -> list[tuple[str, str, list[Any], str]]:
-    """Sections made of tables: identifier, title, sheets, and what else the section holds."""
-    sections = [
-        ("compared", "What was compared", list(tables.captures()), ""),
-        ("paper", "By channel and material", list(tables.paper()), ""),
-        ("latency", "Latency", list(tables.latency()), "latency"),
-        ("stability", "Stability", list(tables.stability()), ""),
-        ("limits", "Physical limits", list(tables.limits()), ""),
-        ("failed", "Failed and not scored", list(tables.failed()), ""),
-    ]
-    return [section for section in sections if section[2] or section[0] not in ("limits", "paper")]
-
-
-def _sections(content: Content, tables: list[tuple[str, str, list[Any], str]]) -> list[tuple[str, str]]:
-    sections = [("summary", "Summary")]
-    if content.boards:
-        sections += [("leaderboard", "Leaderboard"), ("pareto", "Speed against error")]
-        sections += [("range", "By distance"), ("errors", "Errors")]
-    if content.looks:
-        sections.append(("captures-seen", "Best and worst"))
-    sections += [(identifier, title) for identifier, title, *_ in tables]
-    return [*sections, ("notes", "Notes"), ("manifest", "Manifest")]
 
 
 def _facts(session: dict[str, Any], experiment: dict[str, Any]) -> list[tuple[str, str]]:

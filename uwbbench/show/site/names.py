@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
+from uwbbench.config.detector import from_results, marked
 from uwbbench.results.leaderboard.suites import Contender, Suite
 from uwbbench.run.folder.identity import digest
 from uwbbench.show.text.sheet import labels, shown
@@ -32,6 +33,11 @@ class Names:
         versioned = {
             key: f"{short[one.name]} ({one.identity[:SHORT]})" if len(versions[one.name]) > 1 else short[one.name]
             for key, one in contenders.items()
+        }
+        versioned |= {
+            key: marked(versioned[key], results_file=True)
+            for key, one in contenders.items()
+            if from_results(one.config)
         }
         distinct = labels(versioned.values(), longest=60)
         self.detectors = {key: distinct[text] for key, text in versioned.items()}

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
+from typing import Any
 
 UNDEFINED = "n/a"
 
@@ -52,6 +54,18 @@ def interval(value: object, low: object, high: object, digits: int, scale: float
     return f"{text} {ends}" if ends and text != UNDEFINED else text
 
 
+def time_us(row: Mapping[str, Any], key: str) -> str:
+    """Microseconds of a leaderboard's row; of a results file they are as reported, not measured here.
+
+    Examples
+    --------
+    >>> time_us({"p50_us": 41.7, "results_file": True}, "p50_us")
+    '41.7 (as reported)'
+    """
+    text = significant(row[key], 3)
+    return f"{text} (as reported)" if row["results_file"] and text != UNDEFINED else text
+
+
 def between(low: object, high: object, digits: int, scale: float = 1.0) -> str:
     """Interval in brackets; empty where there is none.
 
@@ -87,6 +101,41 @@ def p_value(p: float) -> str:
     ('<0.001', '0.031')
     """
     return "<0.001" if p < 0.001 else number(p, 3)
+
+
+def times(ratio: float) -> str:
+    """A ratio as people say it, with two digits that count.
+
+    Parameters
+    ----------
+    ratio : float
+
+    Examples
+    --------
+    >>> times(33.78), times(1.234), times(0.0517), times(12600.0), times(float("nan"))
+    ('34x', '1.2x', '0.052x', '12600x', 'n/a')
+    """
+    return f"{significant(ratio)}x" if math.isfinite(ratio) else UNDEFINED
+
+
+def significant(value: float | None, digits: int = 2) -> str:
+    """Number with so many digits that count, and none of its whole ones lost.
+
+    Parameters
+    ----------
+    value : float or None
+    digits : int
+        Significant digits.
+
+    Examples
+    --------
+    >>> significant(33.78), significant(0.0517), significant(5.28, 3), significant(242.4, 3), significant(20833.3, 3)
+    ('34', '0.052', '5.28', '242', '20833')
+    """
+    if value is None or not math.isfinite(value):
+        return UNDEFINED
+    before = math.floor(math.log10(abs(value))) + 1 if value else 1
+    return f"{value:.{max(digits - before, 0)}f}"
 
 
 def rounded(value: float | None) -> float | None:

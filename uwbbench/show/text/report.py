@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -12,21 +12,26 @@ from uwbbench.measure.accuracy.metrics.choice import MetricChoice
 from uwbbench.measure.accuracy.stats import MINIMUM_GROUPS
 from uwbbench.results.report import Report
 from uwbbench.results.times import ROWS
+from uwbbench.show.text.captures_sheets import captures_sheet, each_capture_sheet
+from uwbbench.show.text.error_sheets import cause_sheets, curve_sheets, main_causes
 from uwbbench.show.text.limits_sheets import limits_sheets
-from uwbbench.show.text.numbers import interval, number
-from uwbbench.show.text.paper_sheets import paper_sheets
+from uwbbench.show.text.numbers import interval, number, time_us
+from uwbbench.show.text.paper_sheets import paper_sheets, published_sheets
 from uwbbench.show.text.quantity import Quantity, undefined_titles
 from uwbbench.show.text.sheet import Sheet, escaped, sentence, shown
-from uwbbench.show.text.wording import TABLES
+from uwbbench.show.text.wording import TABLES, set_aside_warning
 
 
 def sheets(report: Report) -> list[Sheet]:
     """All tables of a report: leaderboards, the paper's tables, times, and what did not work."""
     tables = Tables(report)
     parts = (
-        tables.leaderboards,
-        tables.paper,
+        tables.published,
         tables.limits,
+        tables.leaderboards,
+        tables.causes,
+        tables.curves,
+        tables.paper,
         tables.latency,
         tables.stability,
         tables.captures,
@@ -46,17 +51,33 @@ class Tables:
     def __init__(self, report: Report) -> None:
         self._report = report
 
+    def published(self) -> Iterator[Sheet]:
+        """Published figures beside this run's, where it covers the rows of the paper."""
+        return self._labelled(published_sheets(self._report))
+
     def leaderboards(self) -> Iterator[Sheet]:
         """One for each dataset, scoring and table."""
-        return _leaderboards(self._report)
+        return self._labelled(_leaderboards(self._report))
+
+    def causes(self) -> Iterator[Sheet]:
+        """What each cause of errors costs, on one board of each dataset."""
+        known = [one for one in self._report.causes if one.board[0] not in self._report.limits.datasets]
+        return self._labelled(cause_sheets(main_causes(known)))
+
+    def curves(self) -> Iterator[Sheet]:
+        """Detectors without their thresholds."""
+        every = self._report.curves
+        return self._labelled(
+            curve_sheets({k: v for k, v in every.items() if k[0] not in self._report.limits.datasets})
+        )
 
     def paper(self) -> Iterator[Sheet]:
         """The two tables of arXiv 2512.01018."""
-        return paper_sheets(self._report)
+        return self._labelled(paper_sheets(self._report))
 
     def limits(self) -> Iterator[Sheet]:
         """Detectors against physical limits, where the run has test signals."""
-        return limits_sheets(self._report.limits)
+        return self._labelled(limits_sheets(self._report.limits))
 
     def latency(self) -> Iterator[Sheet]:
         """Times of every detector and timed capture."""
@@ -69,11 +90,14 @@ class Tables:
             yield _stability(self._report)
 
     def captures(self) -> Iterator[Sheet]:
-        """What was compared on, with licence."""
-        keys = ("dataset", "capture", "source", "frames", "license", "description")
+        """What was compared on, with licence: one row for captures of the same description."""
         if self._report.captures:
-            rows = tuple(tuple(sentence(str(one[key])) for key in keys) for one in self._report.captures)
-            yield Sheet("Captures", keys, rows)
+            yield captures_sheet(self._report.captures)
+
+    def each_capture(self) -> Iterator[Sheet]:
+        """Every capture with what distinguishes it from those of the same description."""
+        if self._report.captures:
+            yield each_capture_sheet(self._report.captures)
 
     def failed(self) -> Iterator[Sheet]:
         """What did not run, and what could not be scored, with reasons."""
@@ -82,13 +106,18 @@ class Tables:
                 (str(e.kind), shown(e.detector), shown(e.dataset), shown(e.capture), sentence(e.reason))
                 for e in self._report.failures
             )
-            yield Sheet("Failed", ("what", "detector", "dataset", "capture", "reason"), failed)
+            yield from self._labelled([Sheet("Failed", ("what", "detector", "dataset", "capture", "reason"), failed)])
         if self._report.unscored:
             rows = tuple(
                 (shown(e.detector), shown(e.capture), scoring, sentence(reason))
                 for e, scoring, reason in self._report.unscored
             )
-            yield Sheet("Not scored", ("detector", "capture", "scoring", "reason"), rows)
+            yield from self._labelled([Sheet("Not scored", ("detector", "capture", "scoring", "reason"), rows)])
+
+    def _labelled(self, tables: Iterable[Sheet]) -> Iterator[Sheet]:
+        """Tables that mark the rows of detectors whose results were read from files."""
+        labels = {shown(name): self._report.label(name, shown(name)) for name in self._report.read_only}
+        return (table.renamed("detector", labels) for table in tables)
 
 
 def markdown(report: Report) -> str:
@@ -121,19 +150,23 @@ def _leaderboards(report: Report) -> Iterator[Sheet]:
         groups.setdefault(key, []).append((about, estimates))
     for (dataset, source, scoring, table), members in groups.items():
         open_world = any(not about["exhaustive"] for about, _ in members)
+        main = report.metrics.ranking(exhaustive=not open_world)
         columns = [quantities[name] for name in report.metrics.defined(exhaustive=not open_world)]
-        heads = [by.axis for by in columns]
-        extra = (["chance recall"] if open_world else []) + ["n", "frames", "p50 (us)", "p99 (us)"]
+        columns.sort(key=lambda by: by.name != main)
+        heads = [columns[0].axis, "p50 (us)", "p99 (us)", *(by.axis for by in columns[1:])]
+        extra = (["chance recall"] if open_world else []) + ["n", "frames"]
         rows = []
         for about, estimates in members:
             shown_here = [(estimates[by.name], by) for by in columns]
             cells = [interval(e.value, e.low, e.high, by.digits, by.factor) for e, by in shown_here]
+            cells[1:1] = [time_us(about, "p50_us"), time_us(about, "p99_us")]
             cells += [number(about["chance_recall"], 3)] if open_world else []
-            frames = f"{about['scored_frames']} of {about['frames']}"
-            cells += [str(about["errors"]), frames, number(about["p50_us"], 0), number(about["p99_us"], 0)]
+            cells += [str(about["errors"]), f"{about['scored_frames']} of {about['frames']}"]
             rows.append((shown(about["detector"]), *cells))
         title = f"{shown(dataset)}, {source.upper()}: {scoring} scoring, {TABLES[table]}"
-        notes = tuple(_leaderboard_notes(members, quantities, report.metrics, report.timed))
+        board = dataset, source, scoring, table
+        few = [one for one in report.set_aside if (one.dataset, one.source, one.scoring, "filtering") == board]
+        notes = (*map(set_aside_warning, few), *_leaderboard_notes(members, quantities, report.metrics, report.timed))
         yield Sheet(title, ("detector", *heads, *extra), tuple(rows), notes)
 
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
 
 from uwbbench.api.text import one_line, printable
 
@@ -30,6 +30,14 @@ class Sheet:
     columns: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
     notes: tuple[str, ...] = ()
+
+    def renamed(self, column: str, names: Mapping[str, str]) -> Sheet:
+        """Sheet with other texts in a column, where it has that."""
+        if column not in self.columns:
+            return self
+        at = self.columns.index(column)
+        rows = tuple((*row[:at], names.get(row[at], row[at]), *row[at + 1 :]) for row in self.rows)
+        return replace(self, rows=rows)
 
     def markdown(self) -> str:
         """GitHub-flavoured Markdown."""

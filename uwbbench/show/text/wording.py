@@ -1,6 +1,26 @@
-"""What tables are called where people read them."""
+"""What tables are called where people read them, and what they are warned of."""
 
 from __future__ import annotations
 
+import math
+
+from uwbbench.results.set_aside import SetAside
+from uwbbench.show.text.numbers import number, significant
+from uwbbench.show.text.sheet import shown
+
 TABLES = {"filtering": "after filtering (range)", "mapping": "after mapping (position)"}
 """Names of the paper's two tables."""
+
+
+def set_aside_warning(one: SetAside) -> str:
+    """What a reader must know of a detector most of whose detections its scoring did not look at."""
+    text = (
+        f"{shown(one.detector)}: {one.scoring} scoring looked at {one.judged} of its {one.found} detections and set "
+        f"{one.share:.0%} aside ({significant(one.found / one.frames)} a frame were found)."
+    )
+    if math.isnan(one.precision):
+        return f"{text} Its numbers say nothing about the others."
+    return (
+        f"{text} Judged by object, with all of them, its precision is {number(one.precision, 3)}, with "
+        f"{significant(one.false_alarms_per_minute, 3)} false alarms a minute."
+    )

@@ -42,7 +42,7 @@ def _main() -> None:
     for kind, name, params, roots in json.loads(sys.stdin.read()):
         try:
             digests.append(subject_of(kind, name, params, tuple(map(Path, roots))).digest)
-        except Exception as error:  # noqa: BLE001 - a plugin may raise anything
+        except BaseException as error:  # noqa: BLE001 - a plugin may raise anything, and this process is for it alone
             digests.append(last_line(error))
     sys.stdout.write("\n" + json.dumps(digests))  # on a line of its own, whatever a plugin has printed
 

@@ -10,15 +10,13 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, model_validator
 
 from uwbbench.api import registry
-from uwbbench.api.check import checked
 from uwbbench.api.errors import ConfigError, nearest
 from uwbbench.api.locate import find_config, is_path
-from uwbbench.api.override import with_values
 from uwbbench.api.yaml_file import YamlFile
 from uwbbench.config.datasets import DatasetSource, DatasetUse, dataset_sources
 from uwbbench.config.detector import read_detector
 from uwbbench.config.extends import placed
-from uwbbench.config.given import Given, read_given
+from uwbbench.config.given import Given, read_model
 from uwbbench.config.model import ConfigModel, DetectorName, NamedNull
 from uwbbench.config.rules import GateRadius, IntervalModel, RegionModel, Scoring, Strongest, Table
 from uwbbench.config.source import data_roots
@@ -187,9 +185,7 @@ def read_gate(name: Given, changes: Mapping[str, Any] | None = None, data_dir: P
     ConfigError, PluginError
         If a file is missing or wrong; the message names file, line and key.
     """
-    path, source = read_given("gates", name)
-    data = with_values(source.data, changes, "--set") if changes else source.data
-    model = checked(GateModel, data, source)
+    path, source, model = read_model(GateModel, "gates", name, changes)
     base = None if model.base is None else _side("base", model.base, source, path.parent)
     if model.latency is None and model.deadline is None and not model.accuracy:
         raise ConfigError(f"{source.name}: nothing to check: expected latency, deadline or accuracy")

@@ -8,6 +8,7 @@ from functools import partial
 from time import perf_counter
 
 from uwbbench.api.errors import UwbbenchError
+from uwbbench.api.interruption import by_plugin
 from uwbbench.config.source import CaptureRef
 from uwbbench.measure.latency.machine import machine
 from uwbbench.run.plan import reason_of
@@ -15,10 +16,9 @@ from uwbbench.tools.gate.accuracy import Found, accuracy_check, found_on
 from uwbbench.tools.gate.check import Aspect, Check, GateResult, GateVerdict
 from uwbbench.tools.gate.config import AccuracyModel, Captures, Gate
 from uwbbench.tools.gate.deadline import deadline_checks
-from uwbbench.tools.gate.latency import latency_checks
+from uwbbench.tools.gate.latency import Progress, latency_checks
 from uwbbench.tools.gate.link import worker_of
 
-Progress = Callable[[str], None]
 Listed = Mapping[str, Sequence[CaptureRef]]
 
 
@@ -59,7 +59,9 @@ def _listed(gate: Gate, checks: list[Check]) -> dict[str, list[CaptureRef]]:
     for source in gate.datasets:
         try:
             listed[source.label] = source.references()
-        except Exception as error:  # noqa: BLE001 - an adapter may raise anything; the other datasets still count
+        except BaseException as error:  # an adapter may raise anything; the other datasets still count
+            if not by_plugin(error):
+                raise
             checks.append(_invalid("captures", source.label, reason_of(error)))
     return listed
 

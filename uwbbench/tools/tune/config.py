@@ -12,7 +12,6 @@ import numpy as np
 from pydantic import Field, field_validator, model_validator
 
 from uwbbench.api import registry
-from uwbbench.api.check import checked
 from uwbbench.api.errors import ConfigError
 from uwbbench.api.filters import RankFilter
 from uwbbench.api.locate import find_config, is_path
@@ -21,7 +20,7 @@ from uwbbench.api.yaml_file import YamlFile
 from uwbbench.config.datasets import DatasetSource, DatasetUse, dataset_sources
 from uwbbench.config.detector import DetectorConfig, read_detector
 from uwbbench.config.extends import placed
-from uwbbench.config.given import Given, read_given
+from uwbbench.config.given import Given, read_model
 from uwbbench.config.model import ConfigModel
 from uwbbench.config.rules import GateRadius, IntervalModel, RegionModel, Table
 from uwbbench.config.source import data_roots
@@ -233,9 +232,7 @@ def read_tuning(
     ConfigError, PluginError
         If a file is missing or wrong; the message names file, line and key.
     """
-    path, source = read_given("tuning", name)
-    data = with_values(source.data, changes, "--set") if changes else source.data
-    model = checked(TuneModel, data, source)
+    path, source, model = read_model(TuneModel, "tuning", name, changes)
     with placed(source, ("detector",)):
         use = model.detector
         if is_path(use):

@@ -2,7 +2,7 @@
 
 import pytest
 
-from uwbbench.measure.accuracy.metrics.choice import Absent, MetricChoice
+from uwbbench.measure.accuracy.metrics.choice import Absent, MetricChoice, combined, names_of
 
 DEFAULT = ["precision", "recall", "f1", "mae", "p90", "p95", "sd", "false_alarms_per_minute", "matched_mae"]
 
@@ -53,3 +53,39 @@ def test_a_class_that_is_no_metric_is_noted_and_left_out(install_plugin):
     metrics = MetricChoice()
     assert list(metrics) == DEFAULT
     assert "is no subclass of uwbbench.api.Metric" in metrics.notes[0]
+
+
+def test_an_experiment_chooses_exactly_what_ranks_what_is_a_column_and_what_is_charted():
+    metrics = MetricChoice({"rank": "p95", "table": ["recall", "p95", "bias"], "charts": ["bias"]})
+    assert metrics.ranking(exhaustive=True) == "p95"
+    assert metrics.defined(exhaustive=True) == ["recall", "p95", "bias"]
+    assert list(metrics.brief) == ["recall", "p95", "bias"]
+    assert metrics.headline(exhaustive=True) == ["bias"]
+    assert metrics.compared(exhaustive=True) == ["p95", "bias"]
+
+
+def test_what_an_experiment_leaves_open_stays_as_it_is_for_everyone():
+    usual, ranked = MetricChoice(), MetricChoice({"rank": "mae"})
+    assert ranked.ranking(exhaustive=True) == "mae"
+    assert ranked.defined(exhaustive=True) == usual.defined(exhaustive=True)
+    assert list(ranked.brief) == list(usual.brief)
+    assert ranked.headline(exhaustive=True) == ["mae", "f1", "recall", "p95"]
+    columns = MetricChoice({"table": ["mae"]})
+    assert columns.headline(exhaustive=True) == usual.headline(exhaustive=True)
+    assert columns.ranking(exhaustive=True) == "f1"
+
+
+def test_the_metric_that_ranks_is_always_a_column():
+    metrics = MetricChoice({"rank": "p90", "table": ["mae", "precision"]})
+    assert metrics.defined(exhaustive=True) == ["p90", "mae", "precision"]
+    assert list(metrics.brief) == ["p90", "mae", "precision"]
+    assert MetricChoice({"table": ["mae"]}).defined(exhaustive=False) == ["recall", "mae"]
+
+
+def test_experiments_that_agree_keep_their_choice_and_others_show_what_any_of_them_has():
+    exact = {"rank": "mae", "table": ["mae", "bias"]}
+    assert combined([exact, dict(exact)]).defined(exhaustive=True) == ["mae", "bias"]
+    both = combined([["sd"], exact])
+    assert both.listed == ("sd", "mae", "bias")
+    assert both.defined(exhaustive=True) == [*DEFAULT[:8], "bias", "matched_mae"]
+    assert names_of([]) == names_of({}) == []

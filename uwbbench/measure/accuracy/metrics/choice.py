@@ -3,6 +3,8 @@
 Conventions
 -----------
 * Every run shows the installed metrics whose ``default`` is true, and those that its experiment lists.
+* An experiment that says where (``rank``, ``table``, ``charts``) has exactly those there, in its own order; what it
+  leaves out stays as it is for everyone. The metric that ranks is always a column of the table, the first if need be.
 * They stand in the metrics' own ``order``. The *headline* ones, for where room or time is short, are the listed ones in
   the order of the list, then the default ones by their ``headline``.
 * The first listed metric ranks; where it has no better end, or is undefined on a board, the first default headline
@@ -14,7 +16,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import ClassVar, Literal
+from typing import Any, ClassVar, Literal
 
 from uwbbench.api import registry
 from uwbbench.api.arrays import FloatArray
@@ -23,6 +25,25 @@ from uwbbench.api.metric import Metric, Outcome
 
 MOST_COMPARED = 3
 """Default headline metrics in which detectors are compared in pairs."""
+
+
+Metrics = Sequence[str] | Mapping[str, Any]
+"""Metrics as an experiment has them: those besides the default ones, or exactly which are shown where."""
+
+
+def names_of(metrics: Metrics) -> list[str]:
+    """Names of all metrics that an experiment has, each once.
+
+    Examples
+    --------
+    >>> names_of({"rank": "recall", "table": ["f1", "recall"]})
+    ['recall', 'f1']
+    """
+    if not isinstance(metrics, Mapping):
+        return list(dict.fromkeys(metrics))
+    rank = metrics.get("rank")
+    names = [*([rank] if rank else []), *(metrics.get("table") or ()), *(metrics.get("charts") or ())]
+    return list(dict.fromkeys(names))
 
 
 class Absent(Metric):
@@ -47,20 +68,21 @@ class MetricChoice(Mapping[str, type[Metric]]):
 
     Parameters
     ----------
-    listed : sequence of str
-        Names that the experiment lists.
+    metrics : sequence of str or mapping
+        As the experiment has them: listed names, or names under ``rank``, ``table`` and ``charts``.
 
     Attributes
     ----------
     listed : tuple of str
-        The same, each once.
+        All names that the experiment has, each once.
     absent : tuple of str
         Listed ones that could not be loaded.
     notes : tuple of str
         What could not be loaded, and why.
     """
 
-    def __init__(self, listed: Sequence[str] = ()) -> None:
+    def __init__(self, metrics: Metrics = ()) -> None:
+        listed = names_of(metrics)
         chosen: dict[str, type[Metric]] = {}
         notes = []
         for name in dict.fromkeys([*listed, *registry.entries("metrics")]):
@@ -74,7 +96,14 @@ class MetricChoice(Mapping[str, type[Metric]]):
         self._by_name = dict(sorted(chosen.items(), key=lambda item: item[1].order))
         places = {name: metric.headline for name, metric in self.items() if metric.default}
         self._leading = [name for _, name in sorted((at, name) for name, at in places.items() if at is not None)]
-        self.listed = tuple(dict.fromkeys(listed))
+        self._first, self._charts = listed, list[str]()
+        self._table, self._narrow = list(self), [name for name in self if self[name].brief or name in listed]
+        self._exact = isinstance(metrics, Mapping)
+        if isinstance(metrics, Mapping):
+            self._first, self._charts = [name for name in [metrics.get("rank")] if name], metrics.get("charts") or []
+            self._table = metrics.get("table") or [name for name in self if self[name].default]
+            self._narrow = metrics.get("table") or [name for name in self._table if self[name].brief]
+        self.listed = tuple(listed)
         self.absent = tuple(name for name in self.listed if chosen[name] is Absent)
         self.notes = tuple(notes)
 
@@ -89,20 +118,24 @@ class MetricChoice(Mapping[str, type[Metric]]):
 
     def defined(self, *, exhaustive: bool) -> list[str]:
         """Names of those that have a meaning where the truth is exhaustive, or is not."""
-        return self._meaningful(self, exhaustive)
+        columns = self._meaningful(self._table, exhaustive)
+        main = [self.ranking(exhaustive=exhaustive)] if self._exact else []
+        return [*(name for name in main if name not in columns), *columns]
 
     @property
     def brief(self) -> dict[str, type[Metric]]:
         """Those of tables that must be narrow."""
-        return {name: metric for name, metric in self.items() if metric.brief or name in self.listed}
+        columns = dict.fromkeys([*(name for name in self._first[:1] if name not in self._narrow), *self._narrow])
+        return {name: self[name] for name in columns}
 
     def headline(self, *, exhaustive: bool) -> list[str]:
         """Names of the few that are charted."""
-        return self._meaningful([*self.listed, *self._leading], exhaustive)
+        return self._meaningful(self._charts or [*self._first, *self._leading], exhaustive)
 
     def compared(self, *, exhaustive: bool) -> list[str]:
         """Names of those that detectors are compared in, in pairs: headline ones, as there are many pairs."""
-        return self._meaningful([*self.listed, *self._leading[:MOST_COMPARED]], exhaustive)
+        others = self._charts or self._leading[:MOST_COMPARED]
+        return self._meaningful([*self._first, *others], exhaustive)
 
     def ranking(self, *, exhaustive: bool) -> str:
         """Name of the metric that ranks.
@@ -112,7 +145,7 @@ class MetricChoice(Mapping[str, type[Metric]]):
         PluginError
             If none that can was loaded.
         """
-        for name in self._meaningful([*self.listed[:1], *self._leading], exhaustive):
+        for name in self._meaningful([*self._first[:1], *self._leading], exhaustive):
             if self[name].better != "zero":
                 return name
         raise PluginError("; ".join(self.notes) or "no installed metric can rank detectors")
@@ -125,6 +158,19 @@ class MetricChoice(Mapping[str, type[Metric]]):
 
     def _meaningful(self, names: Iterable[str], exhaustive: bool) -> list[str]:
         return [name for name in dict.fromkeys(names) if exhaustive or not self[name].needs_exhaustive_truth]
+
+
+def combined(experiments: Sequence[Metrics]) -> MetricChoice:
+    """Choice of several experiments: theirs where they agree, else all that any of them has, besides the default ones.
+
+    Parameters
+    ----------
+    experiments : sequence of sequence or mapping
+        Metrics of each, the one that counts most first.
+    """
+    if experiments and all(metrics == experiments[0] for metrics in experiments):
+        return MetricChoice(experiments[0])
+    return MetricChoice([name for metrics in experiments for name in names_of(metrics)])
 
 
 def load_metric(name: str) -> type[Metric]:

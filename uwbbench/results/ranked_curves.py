@@ -1,0 +1,165 @@
+"""Curves without a threshold of several captures together, with intervals over scenes.
+
+Conventions
+-----------
+* Counts are those of :mod:`uwbbench.measure.accuracy.ranked`: added up over captures before anything is divided.
+* Intervals are those of :mod:`uwbbench.measure.accuracy.intervals`, scenes being the units: of recall and precision
+  at a threshold, of false alarms, and of average precision, which is worked out again without each scene.
+* A curve is thinned to what a chart can show: steps of equal length in recall and false alarms; both ends are kept.
+* Captures whose candidates were ordered by different columns are not put together.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import defaultdict
+from collections.abc import Hashable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from uwbbench.api.arrays import FloatArray, IntArray
+from uwbbench.measure.accuracy import intervals
+from uwbbench.measure.accuracy.intervals import Interval
+from uwbbench.measure.accuracy.ranked import RankedCounts, pooled
+
+MOST_POINTS = 150
+
+CurveKey = tuple[str, str, str]
+"""Dataset, source and detector."""
+
+
+@dataclass(frozen=True)
+class RankedCurve:
+    """What one detector would find at every threshold of its score, on captures of one dataset.
+
+    Attributes
+    ----------
+    order : str
+        Column that orders the candidates.
+    captures, scenes : int
+    average_precision : Interval
+        NaN where the truth is not exhaustive.
+    score : (points,) array
+        Thresholds, falling; the last may be minus infinity.
+    recall, precision, false_alarms_per_minute : Interval of (points,) arrays
+    setting : mapping of str to Interval
+        Recall, precision and false alarms a minute of the detector as it is set.
+    exhaustive : bool
+    """
+
+    order: str
+    captures: int
+    scenes: int
+    average_precision: Interval
+    score: FloatArray
+    recall: Interval
+    precision: Interval
+    false_alarms_per_minute: Interval
+    setting: dict[str, Interval]
+    exhaustive: bool
+
+    def recall_at(self, rate: float) -> float:
+        """Largest recall at no more than so many false alarms a minute; NaN where these are undefined."""
+        if not self.exhaustive:
+            return math.nan
+        reached = self.recall.value[self.false_alarms_per_minute.value <= rate]
+        return float(np.max(reached, initial=0.0))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values; undefined ones are NaN."""
+        names = ("average_precision", "recall", "precision", "false_alarms_per_minute")
+        return {
+            "order": self.order,
+            "captures": self.captures,
+            "scenes": self.scenes,
+            "exhaustive": self.exhaustive,
+            "score": self.score,
+            **{name: _ends(getattr(self, name)) for name in names},
+            "setting": {name: _ends(interval) for name, interval in self.setting.items()},
+        }
+
+
+def _ends(interval: Interval) -> dict[str, Any]:
+    return {"value": interval.value, "low": interval.low, "high": interval.high}
+
+
+def ranked_curve(
+    parts: Sequence[RankedCounts], confidence: float, scenes: Sequence[Hashable] = ()
+) -> RankedCurve | None:
+    """Curve of several captures; None where there are none, or they do not have one order.
+
+    Parameters
+    ----------
+    parts : sequence of RankedCounts
+        One for each capture.
+    confidence : float
+        Of the intervals.
+    scenes : sequence
+        What each capture is of; captures of one scene repeat one another. Empty: each is of a scene of its own.
+    """
+    if not parts or len({part.order for part in parts if part.order}) > 1:
+        return None
+    captures, members = len(parts), defaultdict[Hashable, list[RankedCounts]](list)
+    for scene, part in zip(scenes or range(captures), parts, strict=True):
+        members[scene].append(part)
+    parts = [pooled(repeats) for repeats in members.values()]
+    whole = pooled(parts)
+    rows = _thinned(whole)
+    score = whole.score[rows]
+    tp, fp = (np.stack([_reached(part, name, score) for part in parts], axis=-1) for name in ("tp", "fp"))
+    there, minutes = np.array([part.there for part in parts]), np.array([part.duration_s / 60 for part in parts])
+    set_tp, set_fp = (np.array([getattr(part, name) for part in parts]) for name in ("set_tp", "set_fp"))
+    about = there, minutes, whole.exhaustive, confidence
+    alone = len(parts) == 1
+    left = [] if alone else [pooled([*parts[:at], *parts[at + 1 :]]).average_precision for at in range(len(parts))]
+    area = intervals.of_left_out(
+        whole.average_precision,
+        left or [math.nan],
+        there if left else [0.0],
+        units=len(parts),
+        scale="logit",
+        confidence=confidence,
+    )
+    return RankedCurve(
+        order=whole.order,
+        captures=captures,
+        scenes=len(parts),
+        average_precision=area,
+        score=score,
+        **_intervals(tp, fp, *about),
+        setting=_intervals(set_tp, set_fp, *about),
+        exhaustive=whole.exhaustive,
+    )
+
+
+def _intervals(
+    tp: IntArray, fp: IntArray, there: IntArray, minutes: FloatArray, exhaustive: bool, confidence: float
+) -> dict[str, Interval]:
+    """Recall, precision and false alarms a minute of counts (..., captures)."""
+    found = intervals.share(tp, np.broadcast_to(there, tp.shape), confidence=confidence)
+    true = intervals.share(tp, tp + fp, confidence=confidence)
+    alarms = intervals.ratio(fp, np.broadcast_to(minutes, fp.shape), confidence=confidence)
+    if not exhaustive:
+        true, alarms = (Interval(*(np.full_like(end, math.nan) for end in one)) for one in (true, alarms))
+    return {"recall": found, "precision": true, "false_alarms_per_minute": alarms}
+
+
+def _reached(part: RankedCounts, name: str, score: FloatArray) -> IntArray:
+    """Count (thresholds,) of a capture at thresholds of any capture."""
+    counts = np.concatenate([[0], np.cumsum(getattr(part, name))])
+    return np.asarray(counts[np.searchsorted(-part.score, -score, side="right")])
+
+
+def _thinned(whole: RankedCounts) -> IntArray:
+    """Steps that a chart shows."""
+    steps = len(whole.score)
+    if steps <= MOST_POINTS:
+        return np.arange(steps)
+    way = np.zeros(steps)
+    for counts in (whole.tp, whole.fp):
+        grown = np.cumsum(np.abs(counts))
+        way += np.sqrt(grown / max(grown[-1], 1))  # denser where there are few false alarms yet
+    rows = np.searchsorted(way, np.linspace(way[0], way[-1], MOST_POINTS))
+    return np.unique(np.concatenate([[0], rows, [steps - 1]])).astype(np.int64)

@@ -1,0 +1,143 @@
+"""Detectors without their thresholds: precision against recall, and recall against false alarms."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+
+from uwbbench.measure.accuracy.intervals import Interval
+from uwbbench.results.ranked_curves import RankedCurve
+from uwbbench.show.charts.chart import PLAIN_NUMBERS, Series, Spec, axis, chart
+from uwbbench.show.text.numbers import interval, number, rounded, significant
+
+SHARE: Spec = {"scale": {"domain": [0, 1], "nice": False}, "axis": {"format": PLAIN_NUMBERS, "tickCount": 6}}
+
+
+def precision_against_recall(title: str, curves: Mapping[str, RankedCurve], names: Mapping[str, str]) -> Spec | None:
+    """Precision against recall, a curve for each detector and a point where it is set; None where none is defined.
+
+    Parameters
+    ----------
+    title : str
+    curves : mapping of str to RankedCurve
+        By detector.
+    names : mapping of str to str
+        Labels of detectors.
+    """
+    drawn = {name: curve for name, curve in curves.items() if curve.exhaustive and len(curve.score)}
+    if not drawn:
+        return None
+    rows: list[Spec] = [
+        {"detector": names[name], "order": place, "x": recall, "y": precision, "text": text}
+        for name, curve in drawn.items()
+        for place, (recall, precision, text) in enumerate(_steps(curve, curve.recall, curve.precision))
+    ]
+    points = [_point(names[name], curve, "recall", "precision") for name, curve in drawn.items()]
+    x, y = axis("x", "Recall", **SHARE), axis("y", "Precision", **SHARE)
+    subtitle = "Every threshold of the score. Marks: each detector as it is set, with its intervals."
+    return chart(
+        title, subtitle, _layers(Series(names, [row["detector"] for row in rows]), x, y, points), data={"values": rows}
+    )
+
+
+def recall_against_false_alarms(title: str, curves: Mapping[str, RankedCurve], names: Mapping[str, str]) -> Spec | None:
+    """Recall against false alarms a minute, on a logarithmic axis whose left end is none at all.
+
+    Parameters
+    ----------
+    title : str
+    curves : mapping of str to RankedCurve
+        By detector.
+    names : mapping of str to str
+        Labels of detectors.
+    """
+    drawn = {name: curve for name, curve in curves.items() if curve.exhaustive and len(curve.score)}
+    rates = [curve.false_alarms_per_minute.value for curve in drawn.values()]
+    rates += [np.atleast_1d(curve.setting["false_alarms_per_minute"].value) for curve in drawn.values()]
+    some = np.concatenate([*rates, np.empty(0)])
+    some = some[some > 0]
+    if not len(some):
+        return None
+    least, most = float(some.min()) / 2, float(some.max()) * 1.25
+    rows: list[Spec] = [
+        {"detector": names[name], "order": place, "x": max(rate, least), "y": recall, "text": text}
+        for name, curve in drawn.items()
+        for place, (rate, recall, text) in enumerate(_steps(curve, curve.false_alarms_per_minute, curve.recall))
+    ]
+    points = [_point(names[name], curve, "false_alarms_per_minute", "recall", least) for name, curve in drawn.items()]
+    scale = {"type": "log", "domain": [least, most], "nice": False}
+    x = axis(
+        "x", "False alarms a minute (log; left end: none)", scale=scale, axis={"format": PLAIN_NUMBERS, "tickCount": 6}
+    )
+    y = axis("y", "Recall", **SHARE)
+    subtitle = "Every threshold of the score. Marks: each detector as it is set, with its intervals."
+    return chart(
+        title, subtitle, _layers(Series(names, [row["detector"] for row in rows]), x, y, points), data={"values": rows}
+    )
+
+
+def _steps(curve: RankedCurve, across: Interval, up: Interval) -> list[tuple[float, float, str]]:
+    """Points of a curve that have both values, with the threshold and the interval of recall in words."""
+    said = []
+    columns = (curve.score, across.value, up.value, curve.recall.low, curve.recall.high, curve.recall.value)
+    for score, x, y, low, high, recall in zip(*(values.tolist() for values in columns), strict=True):
+        if not (math.isnan(x) or math.isnan(y)):
+            threshold = f"{curve.order} of {number(score, 2)} or more" if math.isfinite(score) else "all candidates"
+            said.append((rounded(x) or 0.0, rounded(y) or 0.0, f"{threshold}: recall {interval(recall, low, high, 3)}"))
+    return said
+
+
+def _point(name: str, curve: RankedCurve, across: str, up: str, least: float = 0.0) -> Spec:
+    """A detector as it is set; its interval is as short as its value where there is none."""
+    point: Spec = {"detector": name}
+    for key, quantity in (("x", across), ("y", up)):
+        one = curve.setting[quantity]
+        value, low, high = (float(end) for end in (one.value, one.low, one.high))
+        value = least if math.isnan(value) else max(value, least)
+        point |= {key: rounded(value), f"{key}low": rounded(value if math.isnan(low) else max(low, least))}
+        point |= {f"{key}high": rounded(value if not math.isfinite(high) else high)}
+    recall, precision, alarms = (curve.setting[key] for key in ("recall", "precision", "false_alarms_per_minute"))
+    point["text"] = ", ".join(
+        f"{what} {interval(float(one.value), float(one.low), float(one.high), 3)}"
+        for what, one in (("recall", recall), ("precision", precision))
+    )
+    point["text"] += f", {significant(float(alarms.value), 3)} false alarms a minute"
+    return point
+
+
+def _layers(series: Series, x: Spec, y: Spec, points: list[Spec]) -> list[Spec]:
+    look, quiet = series.encoding(), series.encoding(legend=False)
+    names = {"field": "detector", "title": "Detector"}
+    bars = [
+        {
+            "data": {"values": points},
+            "mark": {"type": "rule", "strokeWidth": 1.4, "clip": True, "opacity": 0.55},
+            "encoding": {
+                "x": {**x, "field": "xlow"} if level else x,
+                "y": y if level else {**y, "field": "ylow"},
+                **({"x2": {"field": "xhigh"}} if level else {"y2": {"field": "yhigh"}}),
+                "color": quiet["color"],
+            },
+        }
+        for level in (True, False)
+    ]
+    return [
+        {
+            "mark": {"type": "line", "interpolate": "step-before", "strokeWidth": 1.8, "clip": True},
+            "encoding": {
+                "x": x,
+                "y": y,
+                "order": {"field": "order"},
+                "color": quiet["color"],
+                "tooltip": [names, {"field": "text", "title": "Threshold"}],
+            },
+        },
+        *bars,
+        {
+            "data": {"values": points},
+            "mark": {"type": "point", "filled": True, "size": 95, "opacity": 1, "clip": False},
+            "encoding": {"x": x, "y": y, **look, "tooltip": [names, {"field": "text", "title": "As set"}]},
+        },
+    ]
