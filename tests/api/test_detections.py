@@ -69,3 +69,24 @@ def test_the_exported_table_has_every_column_in_order_and_the_plugins_own_behind
 
 def test_a_table_without_clustering_has_missing_clusters_not_noise():
     assert Detections([0]).to_pandas()["cluster"].isna().all()
+
+
+def test_records_are_the_rows_as_plain_values():
+    table = np.array([[0.0, 2.5, 7.0], [0.0, 3.5, np.inf]])
+    table[:, 0] = np.array([4, 2**53 + 1]).view(np.float64)
+    compiled = Detections.of_table(("range_m", "tap"), table, (4, np.ones(1, bool)), ())
+    expected = [{"frame": 4, "range_m": 2.5, "tap": 7.0}, {"frame": 2**53 + 1, "range_m": 3.5, "tap": np.inf}]
+    assert compiled.records() == expected
+    assert Detections(compiled.frame, range_m=[2.5, 3.5], tap=[7.0, np.inf]).records() == expected
+    assert {type(value) for row in expected for value in row.values()} == {int, float}
+    assert Detections.empty().records() == []
+
+
+def test_hand_outs_stay_with_the_rows_and_processed_frames_must_match():
+    found = Detections([1, 2], range_m=[1.0, 2.0], processed=[0, 1, 2]).with_hand_outs([3, 2], [0, 1, 2])
+    part = found.take(np.array([True, False]))
+    assert part["handed_out"].tolist() == [3]
+    assert part.answered.tolist() == [0, 1, 2]
+    with pytest.raises(ValueError, match="2 frames answered, but 3 processed"):
+        found.with_hand_outs([3, 2], [0, 1])
+    assert found.annotated(processed=np.array([1, 2])).answered is None

@@ -32,7 +32,6 @@ from harness import (
 
 from uwbbench.api import Capture, Detections, FloatArray, Frames
 from uwbbench.detect.pipeline import BATCH_FRAMES, Pipeline, load_detector
-from uwbbench.measure.latency.loops import cut
 
 FRAME_COUNTS = (1_000, 10_000, 100_000, 1_000_000)
 TAP_COUNTS = (50, 100, 200, 400, 1016)
@@ -192,6 +191,11 @@ def batch(detector: Pipeline, capture: Capture, whole: Frames, **how: int) -> Ca
         return lambda: [*map(stream.step, blocks), stream.flush()]
 
     return prepare
+
+
+def cut(whole: Frames, size: int) -> list[Frames]:
+    """Fresh consecutive blocks of frames."""
+    return [whole.part(start, min(start + size, len(whole))) for start in range(0, len(whole), size)]
 
 
 def joined(run: Run) -> Detections:

@@ -12,7 +12,7 @@ from time import perf_counter_ns
 import frames as made
 import naive
 import numpy as np
-from bench_batch import check
+from bench_batch import check, cut
 from harness import (
     Disagreement,
     Effort,
@@ -30,9 +30,10 @@ from harness import (
 
 from uwbbench.api import Capture, Detections, FloatArray, Frames
 from uwbbench.detect.pipeline import Pipeline, Stream, load_detector
-from uwbbench.measure.latency.loops import call_times_us, cut, endless, warm_up
+from uwbbench.measure.latency.loops import stream_pass, warm_up
 from uwbbench.measure.latency.memory import resident_bytes
 from uwbbench.measure.latency.paced import paced_pass, responses_us
+from uwbbench.measure.latency.received import laps, received
 
 PERIOD_US = 1e6 / made.FRAME_RATE_HZ
 LONG_STREAM = 100_000
@@ -53,15 +54,16 @@ def looped(effort: Effort) -> list[Row]:
     whole = capture.frames()
     detector = load_detector("paper-filtering")
     check(naive.filtering(capture, whole), Detections.join([*map(detector.open(capture).step, cut(whole, 1))]))
+    frames = received(capture)
     rounds = effort.rounds(15)
     shape = (rounds, 2, len(whole))
     scripted, ours = np.empty(shape), np.empty(shape)
     with alone():
-        warm_up(detector, capture, whole, WARM_UP_WINDOWS)
+        warm_up(detector, capture, frames, WARM_UP_WINDOWS)
         for turn in range(rounds):
             scripted[turn, 0] = _scripted_us(capture, whole)
             for half in range(2):
-                ours[turn, half] = call_times_us(detector.open(capture), cut(whole, 1))
+                ours[turn, half] = stream_pass(detector, capture, frames).step_us
             scripted[turn, 1] = _scripted_us(capture, whole)
     middle = np.median(ours, axis=(1, 2))
     tail = np.percentile(ours, 99, axis=(1, 2))
@@ -86,11 +88,11 @@ def _scripted_us(capture: Capture, whole: Frames) -> FloatArray:
 def paced(effort: Effort) -> list[Row]:
     """Single frames at 96 Hz, with caches that have gone cold in between."""
     capture = made.approach(sts=False)
-    whole = capture.frames()
+    frames = received(capture)
     detector = load_detector("paper-filtering")
     with alone():
-        warm_up(detector, capture, whole, WARM_UP_WINDOWS)
-        times_us, _ = paced_pass(detector, capture, whole, made.FRAME_RATE_HZ, effort.paced_s)
+        warm_up(detector, capture, frames, WARM_UP_WINDOWS)
+        times_us, _ = paced_pass(detector, capture, frames, made.FRAME_RATE_HZ, effort.paced_s)
     second = round(made.FRAME_RATE_HZ)
     blocks = times_us[: len(times_us) // second * second].reshape(-1, second)  # neighbours are alike: resample seconds
     p99_us = resampled(blocks, lambda drawn: np.percentile(drawn, 99))
@@ -105,14 +107,14 @@ def paced(effort: Effort) -> list[Row]:
 def memory(effort: Effort) -> Row:
     """What a long stream keeps of each frame, once its buffers have their size."""
     capture = made.approach(effort.frames(made.FRAMES), sts=False)
-    whole = capture.frames()
+    frames = received(capture)
     length = 2_000 if effort.quick else LONG_STREAM
     detector = load_detector("paper-filtering")
-    warm_up(detector, capture, whole, WARM_UP_WINDOWS)
-    resident = _kept(detector, capture, whole, length, lambda: resident_bytes() or 0)
+    warm_up(detector, capture, frames, WARM_UP_WINDOWS)
+    resident = _kept(detector, capture, frames, length, lambda: resident_bytes() or 0)
     tracemalloc.start()
     try:
-        live = _kept(detector, capture, whole, length, lambda: tracemalloc.get_traced_memory()[0])
+        live = _kept(detector, capture, frames, length, lambda: tracemalloc.get_traced_memory()[0])
     finally:
         tracemalloc.stop()
     note = f"resident size {resident:+.2g} bytes a frame"
@@ -120,14 +122,14 @@ def memory(effort: Effort) -> Row:
     return at_most(title, 1, once(live), unit="bytes", note=note)
 
 
-def _kept(detector: Pipeline, capture: Capture, whole: Frames, length: int, reading: Callable[[], int]) -> float:
+def _kept(detector: Pipeline, capture: Capture, frames: Capture, length: int, reading: Callable[[], int]) -> float:
     """Growth of a reading for each frame of the last four fifths of a stream."""
-    step, source = detector.open(capture).step, endless(whole, 1 / capture.radar.frame_rate_hz)
+    step, (source, numbers) = detector.open(capture).step, laps(frames, length)
     before = 0
-    for number, frames in zip(range(length), source, strict=False):
+    for number in numbers:
         if number == length // 5:
             before = reading()
-        step(frames)
+        step(source.frames(number, number + 1, sts=False))
     return (reading() - before) / (length - length // 5)
 
 

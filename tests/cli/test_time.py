@@ -4,6 +4,8 @@ import json
 
 import pytest
 
+from uwbbench.tools import warmup
+
 APPROACH = "approach[approach-ch9-metal-1]"
 
 
@@ -13,7 +15,8 @@ def test_json_holds_every_number_and_every_call(uwbbench, capture, detector) -> 
     assert (found["capture"], found["source"], found["frames"]) == ("approach-ch9-metal-1", "simulated", 39)
     assert [one["detector"] for one in found["detectors"]] == ["simple", "null"]
     for one in found["detectors"]:
-        assert len(one["times_us"]) == one["n"] == 39
+        assert one["timed"] == "samples to rows"
+        assert len(one["times_us"]) == len(one["step_us"]) == one["n"] == 39
         assert len(one["paced_times_us"]) == one["paced"]["n"] == 20
         assert one["ratio_to_reference"]["reference"] == "null"
         assert one["ratio_to_reference"]["blocks"] >= 40
@@ -33,7 +36,9 @@ def test_people_see_the_ratio_first_and_that_times_hold_here_only(uwbbench, capt
         "missed deadlines",
         "clustering calls",
         "at 48 Hz for 0.1 s",
-        "null detector, a call",
+        "step alone, p50",
+        "age of the answers",
+        "a detector that does nothing",
     ):
         assert line in out
     assert "n/a (too few calls)" in out
@@ -86,3 +91,22 @@ def test_a_detector_that_cannot_run_on_the_capture_is_told_before_anything_is_ti
 
 def test_a_capture_without_frames_is_a_mistake(uwbbench, empty_capture) -> None:
     assert "has no frames" in uwbbench("time", empty_capture, "-d", "null", code=2).stderr
+
+
+def test_all_detectors_that_can_work_on_a_capture_are_one_line_each(
+    uwbbench, capture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(warmup, "installed_detectors", lambda: ["paper-filtering", "constant", "gone.yaml"])
+    result = uwbbench("time", capture, "--all", "-d", "null", "--frames", 10, "--blocks", 8)
+    lines = [line.split() for line in result.stdout.splitlines()]
+    assert [line[0] for line in lines if line and line[0] in ("null", "paper-filtering", "constant")] == [
+        "null",
+        "paper-filtering",
+        "constant",
+    ]
+    assert "rows / paper-filtering" in " ".join(result.stdout.split())
+    assert "note: not timed: gone.yaml: no such file" in result.stderr
+
+
+def test_without_a_detector_one_is_asked_for(uwbbench, capture) -> None:
+    assert "name one with --detector, or give --all" in uwbbench("time", capture, code=2).stderr

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field, fields
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any, Literal, Protocol, runtime_checkable
 
 import numpy as np
@@ -36,22 +37,29 @@ def analytic(real: FloatArray) -> ComplexArray:
     Negative frequencies are set to zero and positive ones doubled, so that the magnitude is the envelope
     (Marple, IEEE Trans. Signal Processing 47(9), 1999).
     """
-    taps = real.shape[-1]
+    spectrum = np.fft.fft(real.astype(np.float64), axis=-1)
+    return np.asarray(np.fft.ifft(spectrum * _analytic_gain(real.shape[-1]), axis=-1))
+
+
+@lru_cache(maxsize=8)
+def _analytic_gain(taps: int) -> FloatArray:
+    """Gain (taps,) of each frequency; kept, as a stream asks for it in every frame."""
     gain = np.zeros(taps)
     gain[0] = 1.0
     gain[1 : (taps + 1) // 2] = 2.0
     if taps % 2 == 0:
         gain[taps // 2] = 1.0
-    return np.asarray(np.fft.ifft(np.fft.fft(real.astype(np.float64), axis=-1) * gain, axis=-1))
+    return gain
 
 
 def _finite_frames(samples: Any) -> BoolArray:
     """Mask (frames,) of the rows without NaN and infinity.
 
-    Nearly always all of them are, which one pass over real numbers in memory order shows; else each row is checked.
+    Nearly always all of them are, which their sum of squares shows, the cheapest to ask of a single frame; where it is
+    not finite, be it by overflow, each row is checked.
     """
     real = samples.view(samples.real.dtype)
-    if np.isfinite(real).all():
+    if math.isfinite(np.vdot(real, real)):
         return np.ones(len(samples), dtype=np.bool_)
     return np.asarray(np.isfinite(real).all(axis=1))
 

@@ -30,7 +30,10 @@ COLUMNS = (
 )
 """Columns of every exported table, in this order; a column that no stage computed is empty there."""
 
-_INTEGER = ("frame", "cluster")
+HANDED_OUT = "handed_out"
+"""Column of :meth:`Detections.with_hand_outs`."""
+
+_INTEGER = ("frame", "cluster", HANDED_OUT)
 
 _Table = tuple[Sequence[str], FloatArray]
 """Names of columns, and the frames and these columns as one array."""
@@ -57,6 +60,8 @@ class Detections:
     **columns : (n,) arrays
         Any of :data:`COLUMNS`, and columns of a plugin's own.
     """
+
+    _answered: IntArray | None = None
 
     def __init__(
         self,
@@ -200,6 +205,14 @@ class Detections:
         return self["azimuth_rad"]
 
     @property
+    def answered(self) -> IntArray | None:
+        """Frame (m,) after whose step each of ``processed`` was first named; None where that is not known.
+
+        A frame that was named only at the end has the number of frames of its capture.
+        """
+        return self._answered
+
+    @property
     def candidates(self) -> Detections | None:
         """Every peak before the filters, found on demand; None where the detector does not give them."""
         if callable(self._candidates):
@@ -216,6 +229,23 @@ class Detections:
         if wrong:
             raise ValueError(f"detection columns differ in length: {len(self)} rows, but {wrong}")
         return self._with({**self.columns, **added})
+
+    def with_hand_outs(self, handed_out: ArrayLike, answered: ArrayLike) -> Detections:
+        """Return the same detections with the time at which each was known, counted in frames of the stream.
+
+        Parameters
+        ----------
+        handed_out : (n,) int array
+            Index of the frame after whose step each detection was handed out; the number of frames of the capture for
+            one that came only at the end. Becomes the column ``handed_out``.
+        answered : (m,) int array
+            The same for each of the processed frames: when the detector first named it as processed.
+        """
+        made = self.with_columns(**{HANDED_OUT: handed_out})
+        made._answered = np.asarray(answered, dtype=np.int64)
+        if len(made._answered) != len(made.processed):
+            raise ValueError(f"{len(made._answered)} frames answered, but {len(made.processed)} processed")
+        return made
 
     def take(self, rows: BoolArray | IntArray) -> Detections:
         """Return the rows of a mask or an index array; the processed frames stay."""
@@ -245,7 +275,7 @@ class Detections:
         """
         made = self._with(self._columns)
         if processed is not None:
-            made._processed, made._unsorted = processed, False
+            made._processed, made._unsorted, made._answered = processed, False, None
         if notes is not None:
             made._notes = notes
         if candidates is not None:
@@ -260,6 +290,7 @@ class Detections:
         made._columns = columns
         made._processed, made._unsorted = self._processed, self._unsorted
         made._notes, made._candidates, made._chain = self._notes, self._candidates, self._chain
+        made._answered = self._answered
         return made
 
     @staticmethod
@@ -279,6 +310,26 @@ class Detections:
         seen = np.unique(np.concatenate([part.processed for part in parts])) if parts else np.empty(0, np.int64)
         facts: dict[str, Any] = columns
         return Detections(frame, processed=seen, notes=notes, **facts)
+
+    def records(self) -> list[dict[str, Any]]:
+        """Rows as plain values, one mapping of column to number for each: what a program without arrays reads.
+
+        Examples
+        --------
+        >>> Detections([4], range_m=[2.5]).records()
+        [{'frame': 4, 'range_m': 2.5}]
+        """
+        if not len(self):
+            return []
+        if isinstance(self._columns, tuple):
+            names, table = self._columns
+            values = table.tolist()
+            for row, frame in zip(values, self.frame.tolist(), strict=True):
+                row[0] = frame
+            names = ("frame", *names)
+            return [dict(zip(names, row, strict=True)) for row in values]
+        columns = [values.tolist() for values in self._columns.values()]
+        return [dict(zip(self._columns, row, strict=True)) for row in zip(*columns, strict=True)]
 
     def to_pandas(self) -> pd.DataFrame:
         """Table with :data:`COLUMNS` first, then columns of plugins.

@@ -50,7 +50,9 @@ def score(
         raise ScoringError(f"{capture}: the capture has no ground truth; it can be detected on, but not scored")
     if detector is not None:
         pipeline = _loaded(detector, settings)
-        detections = pipeline.run(opened, candidates=scoring is options.Scoring.PEAK)
+        detections = pipeline.run(
+            opened, candidates=scoring is options.Scoring.PEAK, handed_out=scoring is options.Scoring.LATEST
+        )
         name, why = pipeline.name, "are invalid (a sample is not finite)"
         times = _latency_us(capture, opened, pipeline) if latency and len(opened) else None
     elif results is not None:
@@ -81,7 +83,7 @@ def score(
 
 
 def _latency_us(path: Path, opened: Capture, pipeline: Pipeline) -> dict[str, Any]:
-    """Times in microseconds, measured in a fresh process, and the number of calls behind them."""
+    """Times in microseconds, measured in a fresh process, the number of calls behind them, and the age of answers."""
     from uwbbench.config.source import CaptureRef
     from uwbbench.measure.latency import measure
     from uwbbench.measure.latency.settings import LatencyModel
@@ -91,7 +93,8 @@ def _latency_us(path: Path, opened: Capture, pipeline: Pipeline) -> dict[str, An
         CaptureRef.of_file(path, receiver), pipeline.config, LatencyModel.model_validate({"reference": None})
     ).to_dict()
     times = {key.removesuffix("_us"): value for key, value in measured.items() if key.endswith("_us")}
-    return {"n": measured["n"], **times}
+    step = {f"step_{name.removesuffix('_us')}": value for name, value in (measured["step"] or {}).items()}
+    return {"n": measured["n"], **times, **step, "age": measured["age"]}
 
 
 def _read(path: Path, opened: Capture, *, latency: bool) -> tuple[Detections, dict[str, Any] | None]:

@@ -17,6 +17,7 @@ class Scoring(StrEnum):
     FRAME = "frame"
     PEAK = "peak"
     OBJECT = "object"
+    LATEST = "latest"
 
 
 class Surface(StrEnum):

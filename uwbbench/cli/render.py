@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
@@ -76,15 +77,19 @@ def print_scores(result: Mapping[str, Any]) -> None:
         typer.echo("after mapping: n/a (the detector does not cluster positions)")
     times = result["latency_us"]
     if times is not None:
-        shown = [f"{key} {number(times[key], 1, 1.0, 'us', 'too few calls')}" for key in _TIMES if key in times]
+        shown = [
+            f"{key.replace('_', ' ')} {number(times[key], 1, 1.0, 'us', 'too few calls')}"
+            for key in _TIMES
+            if key in times
+        ]
         how = f"as the file reports it ({times['n']} frames)"
         if not times.get("as_reported"):
-            how = f"one frame a call ({times['n']} calls)"
+            how = f"from samples to rows, one frame a call ({times['n']} calls)"
         typer.echo(f"time a frame, {how}: {', '.join(shown)}")
     print_notes(result["notes"])
 
 
-_TIMES = ("p50", "p90", "p95", "p99", "amortised", "deadline")
+_TIMES = ("p50", "p90", "p95", "p99", "amortised", "deadline", "step_p50")
 
 
 def _scores(blocks: Sequence[Mapping[str, Any]]) -> Iterator[tuple[str, list[str]]]:
@@ -164,6 +169,8 @@ def print_leaderboard(report: Report) -> None:
     for title, rows in groups.items():
         shown = slice(None) if title in open_world else slice(-1)
         print_table(title, columns[shown], [row[shown] for row in rows])
+        if any(not math.isnan(about["p50_us"]) for about, _ in report.estimates):
+            typer.echo(f"  p50: median time of a frame, {report.timed}, on this machine only")
         if title in open_world:
             missing = undefined_titles(report.metrics)
             typer.echo(f"  truth not exhaustive: no {missing}; errors are of matches; compare recall with chance")

@@ -16,6 +16,7 @@ from uwbbench.show.text.numbers import number
 if TYPE_CHECKING:
     from uwbbench.api.capture import Capture
     from uwbbench.config.source import CaptureRef
+    from uwbbench.detect.pipeline import Pipeline
     from uwbbench.measure.latency import Latency
 
 _OF_A_DATASET = re.compile(r"(?P<dataset>[\w.-]+)\[(?P<name>.+)\]")
@@ -29,9 +30,12 @@ def time(
         ),
     ],
     detector: Annotated[
-        list[str],
+        list[str] | None,
         typer.Option("--detector", "-d", metavar="NAME|FILE", help="Detector by name or file; may be repeated."),
-    ],
+    ] = None,
+    every: Annotated[
+        bool, typer.Option("--all", help="All detectors by name that can work on the capture, in one table.")
+    ] = False,
     reference: Annotated[
         str | None,
         typer.Option(metavar="NAME|FILE", help="Detector that each takes turns with.", show_default="the reference"),
@@ -50,11 +54,11 @@ def time(
     data_dir: options.DataDir = None,
     json: options.Json = False,
 ) -> None:
-    """Measure how fast detectors are, against a reference.
+    """Measure how fast detectors answer, against a reference, and how old their answers are.
 
-    Each is timed in a process of its own, on one core with one thread, one frame a call. What travels between machines
-    is the ratio to the reference, which takes turns with the detector on the same frames; all other times hold on this
-    machine only.
+    Each is timed in a process of its own, on one core with one thread, one frame a call, from raw samples in memory to
+    rows as plain records. What travels between machines is the ratio to the reference, which takes turns with the
+    detector on the same frames; all other times hold on this machine only.
     """
     import uwbbench
     from uwbbench.api import registry
@@ -65,9 +69,12 @@ def time(
         raise ConfigError("--rate-hz is the rate of --paced, which is not given")
     reference = reference or registry.default("detector.reference")
     ref, opened = _open(capture, receiver, data_dir)
-    pipelines = [uwbbench.load_detector(name) for name in detector]
+    pipelines = [uwbbench.load_detector(name) for name in detector or ()]
     for pipeline in (*pipelines, uwbbench.load_detector(reference)):
         pipeline.open(opened)  # what cannot work on this capture is said before anything is timed
+    pipelines += _others(opened, {pipeline.name for pipeline in pipelines}) if every else []
+    if not pipelines:
+        raise ConfigError("no detector: name one with --detector, or give --all")
     asked = {"reference": reference, "frames": frames, "blocks": blocks, "paced_s": paced, "rate_hz": rate_hz}
     settings = LatencyModel.model_validate(asked)
     latencies: list[tuple[str, Latency]] = []
@@ -78,7 +85,26 @@ def time(
     if json:
         render.print_json({**about, "detectors": [_everything(*one) for one in latencies]})
     else:
-        _print(about, latencies)
+        _print(about, latencies, brief=every)
+
+
+def _others(capture: Capture, known: set[str]) -> list[Pipeline]:
+    """Detectors by name, but those that are known already; those that cannot work on the capture are noted."""
+    import uwbbench
+    from uwbbench.api.errors import UwbbenchError
+    from uwbbench.tools.warmup import installed_detectors
+
+    able = []
+    for name in installed_detectors():
+        try:
+            pipeline = uwbbench.load_detector(name)
+            pipeline.open(capture)
+        except UwbbenchError as error:
+            render.print_notes([f"not timed: {error}"])
+            continue
+        if pipeline.name not in known:
+            able.append(pipeline)
+    return able
 
 
 def _open(text: str, receiver: str | None, data_dir: Path | None) -> tuple[CaptureRef, Capture]:
@@ -100,14 +126,17 @@ def _open(text: str, receiver: str | None, data_dir: Path | None) -> tuple[Captu
 
 
 def _everything(name: str, latency: Latency) -> dict[str, Any]:
-    calls = {key: getattr(latency, key).round(3).tolist() for key in ("times_us", "paced_times_us")}
+    calls = {key: getattr(latency, key).round(3).tolist() for key in ("times_us", "step_us", "paced_times_us")}
     return {"detector": name, **latency.to_dict(), **calls}
 
 
-def _print(about: dict[str, Any], latencies: Sequence[tuple[str, Latency]]) -> None:
+def _print(about: dict[str, Any], latencies: Sequence[tuple[str, Latency]], *, brief: bool) -> None:
     """Ratios first, as they travel; then the times of this machine, and how far the measurement can be trusted."""
     label = "SIMULATED capture" if about["source"] == "simulated" else "capture"
     typer.echo(f"{label} '{about['capture']}', {about['frames']} frames, one frame a call")
+    if brief:
+        _print_brief(latencies)
+        return
     names = [name for name, _ in latencies]
     all_latencies = [latency for _, latency in latencies]
 
@@ -115,14 +144,38 @@ def _print(about: dict[str, Any], latencies: Sequence[tuple[str, Latency]]) -> N
         rows = [(text, *(cell(latency) for latency in all_latencies)) for text, cell in lines]
         render.print_table(title, ("", *names), rows)
 
-    table(f"time relative to {_reference(all_latencies[0])['reference']}, in alternating blocks", _RATIOS)
+    reference = _reference(all_latencies[0])["reference"]
+    table(f"time relative to {reference}, samples to rows, in alternating blocks", _RATIOS)
     machine = all_latencies[0].machine
     versions = ", ".join(f"{name} {version}" for name, version in machine["versions"].items())
     table(f"THIS MACHINE ONLY ({machine['cpu']}, {machine['cores']} cores; {versions})", _TIMES)
+    table("age of the answers", _AGES)
     if about["paced_s"] is not None:
         paced = all_latencies[0].paced or {}
         table(f"at {paced['rate_hz']:g} Hz for {about['paced_s']:g} s, asleep in between, THIS MACHINE ONLY", _PACED)
     table("the measurement itself", _QUALITY)
+    for name, latency in latencies:
+        render.print_notes([f"{name}: {note}" for note in latency.notes])
+
+
+def _print_brief(latencies: Sequence[tuple[str, Latency]]) -> None:
+    """One row a detector: samples to rows, the step alone, the ratio and the age of the answers."""
+    rows = []
+    for name, one in latencies:
+        step, age = one.step or {}, one.age
+        times = [number(us, 1, reason="too few") for us in (one.p50_us, one.p99_us, step["p50_us"], step["p99_us"])]
+        ages = ["n/a"] * 5
+        if age is not None:
+            ages = [number(age[f"p{q}_frames"], 0) for q in (50, 95)]
+            ages += [number(age[f"p{q}_s"], 3, 1e3) for q in (50, 95)] + [number(age["end_share"], 1, 100.0)]
+        rows.append((name, *times, _ratio(one, "ratio", "low", "high"), *ages))
+    heads: tuple[str, ...] = ("rows p50 (us)", "rows p99 (us)", "step p50 (us)", "step p99 (us)")
+    heads += (f"rows / {_reference(latencies[0][1])['reference']}", "age p50 (frames)", "p95 (frames)")
+    heads += ("age p50 (ms)", "p95 (ms)", "at the end (%)")
+    machine = latencies[0][1].machine
+    title = f"samples to rows, step alone and age, THIS MACHINE ONLY ({machine['cpu']}, {machine['cores']} cores)"
+    render.print_table(title, ("", *heads), rows)
+    typer.echo("  age n/a: the detector found nothing; at the end: share of detections that only the flush gave")
     for name, latency in latencies:
         render.print_notes([f"{name}: {note}" for note in latency.notes])
 
@@ -185,6 +238,14 @@ def _late_starts(latency: Latency) -> str:
     return f"{paced['late_starts']}, p99 {_us(paced['lateness_p99_us'])}, max {_us(paced['lateness_max_us'])}"
 
 
+def _in_step(q: str) -> Callable[[Latency], str]:
+    return lambda latency: _us((latency.step or {})[q])
+
+
+def _aged(name: str, unit: str, digits: int, factor: float = 1.0) -> Callable[[Latency], str]:
+    return lambda latency: number((latency.age or {}).get(name), digits, factor, unit, "no detections")
+
+
 Lines = tuple[tuple[str, Callable[["Latency"], str]], ...]
 
 _RATIOS: Lines = (
@@ -194,11 +255,16 @@ _RATIOS: Lines = (
 )
 
 _TIMES: Lines = (
-    ("p50", lambda one: _us(one.p50_us)),
-    ("p90", lambda one: _us(one.p90_us)),
-    ("p95", lambda one: _us(one.p95_us)),
-    ("p99", lambda one: _us(one.p99_us)),
-    ("max", lambda one: _us(one.max_us)),
+    ("samples to rows, p50", lambda one: _us(one.p50_us)),
+    ("  p90", lambda one: _us(one.p90_us)),
+    ("  p95", lambda one: _us(one.p95_us)),
+    ("  p99", lambda one: _us(one.p99_us)),
+    ("  max", lambda one: _us(one.max_us)),
+    ("step alone, p50", _in_step("p50_us")),
+    ("  p90", _in_step("p90_us")),
+    ("  p95", _in_step("p95_us")),
+    ("  p99", _in_step("p99_us")),
+    ("  max", _in_step("max_us")),
     ("clustering calls", lambda one: _kind(one.clustering)),
     ("plain calls", lambda one: _kind(one.plain)),
     ("amortised", lambda one: _us(one.amortised_us)),
@@ -217,6 +283,15 @@ _TIMES: Lines = (
     ),
 )
 
+_AGES: Lines = (
+    ("p50", _aged("p50_frames", "frames", 0)),
+    ("p95", _aged("p95_frames", "frames", 0)),
+    ("p50, in time", _aged("p50_s", "ms", 3, 1e3)),
+    ("p95, in time", _aged("p95_s", "ms", 3, 1e3)),
+    ("only at the end", _aged("end_share", "% of the detections", 1, 100.0)),
+    ("detections", _aged("n", "", 0)),
+)
+
 _PACED: Lines = (
     ("p50", _share_in_pace(50)),
     ("p99", _share_in_pace(99)),
@@ -227,7 +302,7 @@ _PACED: Lines = (
 
 _QUALITY: Lines = (
     ("calls", lambda one: str(one.n)),
-    ("null detector, a call", lambda one: _us(one.overhead_us)),
+    ("a detector that does nothing", lambda one: _us(one.overhead_us)),
     ("reading the clock", lambda one: _us(one.clock_us)),
     ("warm-up agreed", lambda one: "yes" if one.warmed else "no"),
     ("compiled while timed", lambda one: _quality(one, "compilations")),

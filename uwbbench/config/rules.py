@@ -9,8 +9,8 @@ from pydantic import Discriminator, Field, Tag, ValidationInfo, field_validator
 
 from uwbbench.config.model import ConfigModel
 
-Scoring = Literal["frame", "peak", "object"]
-"""What counts as one chance to be right: a frame, a peak, or an object in a frame."""
+Scoring = Literal["frame", "peak", "object", "latest"]
+"""What counts as one chance to be right: a frame, a peak, an object in a frame, or the latest answer at a frame."""
 
 Table = Literal["filtering", "mapping"]
 """After which half of a detector: its filters, or its clustering."""

@@ -18,6 +18,7 @@ from uwbbench.api.errors import ConfigError, PluginError
 from uwbbench.api.kernel import Kernel
 from uwbbench.api.stage import Stage
 from uwbbench.config.detector import KERNEL, DetectorConfig, detector_from_text, detector_identity, read_detector
+from uwbbench.detect.hand_out import with_hand_outs
 from uwbbench.detect.sources import source_hash
 from uwbbench.detect.stream import Opened, Stream
 
@@ -151,7 +152,15 @@ class Pipeline:
         notes += [f"left out, as the capture has no {reason}: {', '.join(names)}" for reason, names in left_out.items()]
         return stages, notes
 
-    def run(self, capture: Capture, *, candidates: bool = False, fused: bool = True, threads: int = 1) -> Detections:
+    def run(
+        self,
+        capture: Capture,
+        *,
+        candidates: bool = False,
+        handed_out: bool = False,
+        fused: bool = True,
+        threads: int = 1,
+    ) -> Detections:
         """Detect on a whole capture.
 
         Parameters
@@ -159,6 +168,9 @@ class Pipeline:
         capture : Capture
         candidates : bool
             Find the peaks before the filters in the same run; otherwise they are found when somebody asks.
+        handed_out : bool
+            Find out after which frame each detection is handed out (:mod:`uwbbench.detect.hand_out`), which the scoring
+            ``latest`` asks for.
         fused, threads
             As in :meth:`open`.
 
@@ -173,6 +185,8 @@ class Pipeline:
         if not len(detections):  # an empty table has the columns that a full one would have
             detections = detections.with_columns(**{name: () for name in COLUMNS if name in stream.ports})
         detections = detections.annotated(notes=stream.notes)
+        if handed_out:
+            detections = with_hand_outs(self, capture, detections, threads)
         if candidates:
             return detections.annotated(candidates=_candidates(detections, stream.rejected), chain=stream.chain)
 

@@ -2,8 +2,9 @@
 
 Conventions
 -----------
-* Speed is the time a frame relative to the reference detector of the run, measured in alternating blocks; it is what
-  travels between machines. Over several timed captures it is the geometric mean.
+* Speed is the time a frame, from samples to rows, relative to that of the reference detector of the run, measured in
+  alternating blocks; it is what travels between machines. Where an earlier version measured, it is of the step alone;
+  the two are not mixed. Over several timed captures it is the geometric mean.
 * A detector is on the front if no other one is at least as fast and at least as good, and better in one of them.
 * The probability of being on the front is the share of draws in which it is. A draw takes values of all detectors from
   their joint t distribution over scenes, and a time ratio for each detector from a log-normal distribution through its
@@ -25,6 +26,7 @@ from uwbbench.api.arrays import BoolArray, FloatArray
 from uwbbench.api.metric import Metric
 from uwbbench.measure.accuracy.stats import Estimate, drawn, estimated
 from uwbbench.results.results import Scored, scenes_of
+from uwbbench.results.times import ROWS, comparable, timed_of
 from uwbbench.run.folder.journal import Entry
 
 DRAWS = 2000
@@ -48,6 +50,8 @@ class Speed:
         The radar's frame period, in times of the reference's median time a frame on this machine.
     p50_us : float
         Median time a frame on this machine.
+    timed : str
+        What the times are of (:mod:`uwbbench.results.times`).
     """
 
     reference: str
@@ -57,6 +61,7 @@ class Speed:
     captures: int
     deadline: float
     p50_us: float
+    timed: str = ROWS
 
     @property
     def spread(self) -> float:
@@ -92,7 +97,7 @@ def speed_of(timed: Sequence[Entry]) -> Speed | None:
 
     Several captures are combined by the mean of the logarithms, their intervals as those of independent values.
     """
-    compared = [entry.facts for entry in timed if entry.facts.get("ratio_to_reference")]
+    compared = [e.facts for e in comparable(e for e in timed if e.facts.get("ratio_to_reference"))]
     if not compared:
         return None
     ratios = [facts["ratio_to_reference"] for facts in compared]
@@ -111,15 +116,19 @@ def speed_of(timed: Sequence[Entry]) -> Speed | None:
         captures=len(compared),
         deadline=float(np.median(deadlines)),
         p50_us=float(np.median([facts["p50_us"] for facts in compared])),
+        timed=timed_of(compared[0]),
     )
 
 
 def speeds_of_run(entries: Iterable[Entry]) -> dict[tuple[str, str], Speed]:
     """Speed by dataset and detector, from all entries of a run; without those that were never compared."""
+    datasets: dict[str, list[Entry]] = defaultdict(list)
     timed: dict[tuple[str, str], list[Entry]] = defaultdict(list)
     for entry in entries:
         if (entry.kind, entry.status) == ("latency", "done"):
-            timed[entry.dataset, entry.detector].append(entry)
+            datasets[entry.dataset].append(entry)
+    for entry in (entry for units in datasets.values() for entry in comparable(units)):
+        timed[entry.dataset, entry.detector].append(entry)
     speeds = {key: speed_of(units) for key, units in timed.items()}
     return {key: speed for key, speed in speeds.items() if speed is not None}
 

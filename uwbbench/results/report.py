@@ -6,7 +6,8 @@ Conventions
 * Captures of different datasets, and measured and simulated ones, are never pooled; every row says which it is of.
 * Where the truth is not exhaustive an unmatched detection proves nothing: recall is shown beside the recall of as many
   random ranges (``chance_recall``), and precision and F1 are undefined.
-* Times are those of the machine that ran the experiment, and hold nowhere else.
+* Times are those of the machine that ran the experiment, and hold nowhere else; :mod:`uwbbench.results.times` says what
+  they are of.
 """
 
 from __future__ import annotations
@@ -35,6 +36,7 @@ from uwbbench.results.ranked_curves import CurveKey, RankedCurve, ranked_curve
 from uwbbench.results.results import Scored, errors_in, estimates_of, scenes_of, scored
 from uwbbench.results.set_aside import SetAside, set_aside
 from uwbbench.results.slices import Board
+from uwbbench.results.times import age_columns, comparable, in_words, step_columns, timed_of
 from uwbbench.results.verdicts import Ranks, ranks_of
 from uwbbench.run.folder.folder import RunFolder
 from uwbbench.run.folder.journal import Entry
@@ -160,8 +162,13 @@ class Report:
             mine = [e.facts for e in self._of_kind("accuracy") if (e.detector, e.dataset) == (detector, dataset)]
             timed = [facts[REPORTED_FACT] for facts in mine if REPORTED_FACT in facts]
         else:
-            timed = [e.facts for e in self._of_kind("latency") if (e.detector, e.dataset) == (detector, dataset)]
+            timed = [entry.facts for entry in self.measured(dataset, detector)]
         return {key: _median(facts[key] for facts in timed) for key in ("p50_us", "p99_us")}
+
+    def measured(self, dataset: str, detector: str | None = None) -> list[Entry]:
+        """Latency units of a dataset whose times may stand side by side, of one detector or of all."""
+        units = comparable(entry for entry in self._of_kind("latency") if entry.dataset == dataset)
+        return [entry for entry in units if detector in (None, entry.detector)]
 
     def label(self, detector: str, text: str | None = None) -> str:
         """Name of a detector, or another text for it, as tables show it: marked where its results were read."""
@@ -274,15 +281,28 @@ class Report:
         for entry in self._of_kind("latency"):
             facts = dict(entry.facts)
             ratio, clustering = facts.pop("ratio_to_reference") or {}, facts.pop("clustering") or {}
-            for name in ("plain", "paced", "quality", "machine"):  # only in the JSON; older runs have none
+            columns = {"timed": timed_of(facts), **step_columns(facts), **age_columns(facts)}
+            for name in (
+                "plain",
+                "paced",
+                "quality",
+                "machine",
+                "step",
+                "age",
+            ):  # only in the JSON; older runs have none
                 facts.pop(name, None)
             facts["notes"] = "; ".join(facts["notes"])
             about = {"detector": entry.detector, "dataset": entry.dataset, "capture": entry.capture}
             extra = {"ratio_low": ratio.get("low"), "ratio_high": ratio.get("high"), "ratio": ratio.get("ratio")}
             extra |= {"reference": ratio.get("reference"), "clustering_p50_us": clustering.get("p50_us")}
             extra |= {"total_ratio": ratio.get("total_ratio"), "missed_share_high": facts.get("missed_share_high")}
-            rows.append({**about, **facts, **extra})
+            rows.append({**about, **facts, **columns, **extra})
         return pd.DataFrame(rows)
+
+    @property
+    def timed(self) -> str:
+        """What the times are of, for people."""
+        return in_words(self._of_kind("latency"))
 
     @cached_property
     def captures(self) -> list[dict[str, Any]]:
@@ -353,7 +373,7 @@ class Report:
             "published": self.published,
             "chains": self.chains.to_dict("records"),
             "limits": self.limits.to_dict(),
-            "latency": [{**facts_of(entry), **entry.facts} for entry in self._of_kind("latency")],
+            "latency": [{**facts_of(e), **e.facts, "timed": timed_of(e.facts)} for e in self._of_kind("latency")],
             "captures": self.captures,
             "stability": self.stability,
             "set_aside": [dataclasses.asdict(one) for one in self.set_aside],

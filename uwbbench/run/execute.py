@@ -326,7 +326,7 @@ class _Run:
                 raise
             self._journal(entry_of(unit, "failed", reason=reason_of(error), traceback=traceback.format_exc()))
             return
-        self.folder.write_times(unit.id, latency.times_us, latency.to_dict())
+        self.folder.write_times(unit.id, latency.times_us, latency.to_dict(), latency.step_us)
         if latency.paced is not None:
             self.folder.write_times(f"{unit.id}-paced", latency.paced_times_us, latency.paced)
         facts = {**latency.to_dict(), "elapsed_s": time.perf_counter() - started}

@@ -12,7 +12,7 @@ from typing import Any
 
 from uwbbench.api.arrays import FloatArray
 from uwbbench.api.capture import Capture, CaptureHeader
-from uwbbench.api.detections import Detections
+from uwbbench.api.detections import HANDED_OUT, Detections
 from uwbbench.api.interruption import by_plugin, leave_to_parent
 from uwbbench.config.detector import RESULTS_FILE
 from uwbbench.config.source import CaptureRef
@@ -134,7 +134,7 @@ def _detected(job: Job) -> Finished:
     if unit.detector.results is None:
         pipeline = Pipeline(unit.detector)
         # Kernels count nothing that they drop, so a second pass tells; plain stages do so in the first.
-        detections = pipeline.run(capture, candidates=not pipeline.open(capture).fused)
+        detections = pipeline.run(capture, candidates=not pipeline.open(capture).fused, handed_out=True)
         identity, stored, results = pipeline.identity, None, dict[str, Any]()
     else:
         stored, results = _read(unit, capture)
@@ -213,4 +213,6 @@ def _materials(header: CaptureHeader) -> list[str]:
 def _bare(detections: Detections) -> Detections:
     """Detections without the means to find candidates later, which would drag the capture between processes."""
     columns: dict[str, Any] = detections.columns
-    return Detections(**columns, processed=detections.processed, notes=detections.notes, chain=detections.chain)
+    bare = Detections(**columns, processed=detections.processed, notes=detections.notes, chain=detections.chain)
+    answered = detections.answered
+    return bare if answered is None else bare.with_hand_outs(columns[HANDED_OUT], answered)

@@ -13,7 +13,6 @@ import pytest
 
 if TYPE_CHECKING:
     from uwbbench.api.capture import Capture
-    from uwbbench.api.frames import Frames
     from uwbbench.detect.pipeline import Pipeline
 
 ROUNDS, BATCH_ROUNDS = 1000, 10
@@ -39,7 +38,7 @@ class DetectorBenchmark:
         batch: bool = False,
         rounds: int | None = None,
     ) -> None:
-        """Time a detector, warmed up.
+        """Time a detector, warmed up, from the raw samples in memory on.
 
         Parameters
         ----------
@@ -48,8 +47,8 @@ class DetectorBenchmark:
         capture : str, Path or Capture
             Capture file, or an open capture.
         batch : bool
-            A round is the whole capture in blocks; otherwise it is one frame of a stream, the capture starting again
-            at its end.
+            A round is the whole capture in blocks, up to its detections; otherwise it is one frame of a stream, up to
+            its rows as plain records, the capture starting again at its end.
         rounds : int, optional
             1 000 frames, or 10 batches, if left out.
 
@@ -62,10 +61,11 @@ class DetectorBenchmark:
         from uwbbench.api.errors import CaptureError
         from uwbbench.detect.pipeline import Pipeline, load_detector
         from uwbbench.measure.latency.loops import warm_up
+        from uwbbench.measure.latency.received import received
 
         pipeline = detector if isinstance(detector, Pipeline) else load_detector(detector)
         opened = open_capture(capture) if isinstance(capture, str | Path) else capture
-        frames = opened.frames()
+        frames = received(opened)
         if not len(frames):
             raise CaptureError(f"capture '{opened.name}' has no frames; there is nothing to time")
         self._benchmark.extra_info |= _about(pipeline, opened, "batch" if batch else "stream")
@@ -73,25 +73,30 @@ class DetectorBenchmark:
         time = self._batch if batch else self._stream
         time(pipeline, opened, frames, rounds)
 
-    def _stream(self, pipeline: Pipeline, capture: Capture, whole: Frames, rounds: int | None) -> None:
-        """One frame a round; taking the next frame is not timed."""
-        from uwbbench.measure.latency.loops import endless
+    def _stream(self, pipeline: Pipeline, capture: Capture, frames: Capture, rounds: int | None) -> None:
+        """One frame a round."""
+        from uwbbench.measure.latency.received import laps
 
         stream = pipeline.open(capture)
-        source = endless(whole, 1 / capture.radar.frame_rate_hz, renumbered="truth" not in stream.needs)
-        self._benchmark.pedantic(stream.step, setup=lambda: ((next(source),), {}), rounds=rounds or ROUNDS)
+        source, numbers = laps(frames, rounds or ROUNDS, renumbered="truth" not in stream.needs)
+        step, receive, sts = stream.step, source.frames, "sts" in stream.needs
+        coming = iter(numbers)
 
-    def _batch(self, pipeline: Pipeline, capture: Capture, whole: Frames, rounds: int | None) -> None:
-        """The whole capture a round, each time with a fresh stream and fresh frames, which remember nothing."""
+        def run(frame: int) -> None:
+            step(receive(frame, frame + 1, sts=sts)).records()
+
+        self._benchmark.pedantic(run, setup=lambda: ((next(coming),), {}), rounds=len(numbers))
+
+    def _batch(self, pipeline: Pipeline, capture: Capture, frames: Capture, rounds: int | None) -> None:
+        """The whole capture a round, each time with a fresh stream."""
         from uwbbench.detect.pipeline import BATCH_FRAMES
-        from uwbbench.measure.latency.loops import cut
 
         def fresh() -> tuple[tuple[Any, ...], dict[str, Any]]:
-            return (pipeline.open(capture), cut(whole, BATCH_FRAMES)), {}
+            return (pipeline.open(capture),), {}
 
-        def run(stream: Any, blocks: list[Frames]) -> None:
-            for frames in blocks:
-                stream.step(frames)
+        def run(stream: Any) -> None:
+            for block in frames.blocks(BATCH_FRAMES, sts="sts" in stream.needs):
+                stream.step(block)
             stream.flush()
 
         self._benchmark.pedantic(run, setup=fresh, rounds=rounds or BATCH_ROUNDS)

@@ -87,8 +87,10 @@ class Run:
     def times(self) -> pd.DataFrame:
         """One row for each detector and capture that was timed.
 
-        Times of a frame are in microseconds of the machine that ran the experiment; ``ratio`` is relative to the
-        reference detector, with its interval.
+        Times of a frame are in microseconds of the machine that ran the experiment, from raw samples to rows, as
+        ``timed`` says: in runs of earlier versions they are of the detector's step alone, which ``step_p50_us`` and so
+        on always are. ``ratio`` is relative to the reference detector, with its interval. ``age_p50_frames``,
+        ``age_p50_s`` and so on are the ages of the answers, ``age_end_share`` the share that came only at the end.
         """
         with read_safely(self.path):
             return self._report.latency
@@ -156,6 +158,8 @@ class Run:
 
     def frame_times_us(self, detector: str, capture: str, dataset: str | None = None) -> FloatArray:
         """Time of every call of a latency pass (calls,), in microseconds of the machine that measured it.
+
+        Of what, is said under ``timed`` in :attr:`times`.
 
         Parameters
         ----------

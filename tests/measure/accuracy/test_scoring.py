@@ -7,7 +7,7 @@ import pickle
 import numpy as np
 import pytest
 
-from tests.measure.accuracy.scenes import GATE_M, RATE_HZ, WINDOW_M, capture_of, counts, found_in, post
+from tests.measure.accuracy.scenes import GATE_M, RATE_HZ, WINDOW_M, at_once, capture_of, counts, found_in, post
 from uwbbench.api import Detections, Obstacle, ScoringError
 from uwbbench.api.capture import CaptureHeader
 from uwbbench.measure.accuracy.scoring import SCORINGS, Region, ScoringRules, outcomes, score
@@ -36,7 +36,7 @@ def test_empty_scene_with_output_has_precision_zero_and_no_error():
 
 @pytest.mark.parametrize("scoring", SCORINGS)
 def test_capture_without_frames_scores_nothing(scoring):
-    found = found_in(0).annotated(candidates=found_in(0))
+    found = at_once(found_in(0)).annotated(candidates=found_in(0))
     scores = score(found, capture_of(post(2), frames=0), scoring)
     assert (scores.frames, scores.retained) == (0, 0)
     assert math.isnan(scores.recall)

@@ -21,7 +21,14 @@ REF = CaptureRef("approach", {"speed_m_s": 3.0, "seed": seed()}, (), "approach-c
 
 def test_a_measurement_is_complete_and_consistent() -> None:
     found = measure(REF, read_detector("paper"), LatencyModel(reference="null"))
-    assert found.n == len(found.times_us) == 45
+    assert found.timed == "samples to rows"
+    assert found.n == len(found.times_us) == len(found.step_us) == 45
+    assert found.step is not None
+    assert found.step["p50_us"] == np.median(found.step_us) < found.p50_us
+    assert np.all(found.step_us < found.times_us)
+    assert found.age is not None
+    assert found.age["end_share"] == 1.0  # fewer than the fifty points that start a clustering
+    assert 0 < found.age["p50_frames"] <= found.age["max_frames"] <= 44
     assert found.p50_us == np.median(found.times_us)
     assert found.p90_us == pytest.approx(np.percentile(found.times_us, 90))
     assert (found.p95_us, found.p99_us) == (None, None)

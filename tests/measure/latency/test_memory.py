@@ -7,9 +7,10 @@ import sys
 import numpy as np
 import pytest
 
-from uwbbench.api import Capture
+from uwbbench.api import Capture, Detections
 from uwbbench.detect.pipeline import load_detector
 from uwbbench.measure.latency import memory
+from uwbbench.measure.latency.received import received
 
 
 class Keeping:
@@ -24,8 +25,9 @@ class Keeping:
         self.kept: list[object] = []
         return self
 
-    def step(self, _: object) -> None:
+    def step(self, _: object) -> Detections:
         self.kept.append(np.zeros(self.bytes_a_frame, np.uint8))
+        return Detections.empty()
 
 
 @pytest.fixture
@@ -36,14 +38,14 @@ def patient(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.usefixtures("patient")
 def test_what_a_stream_keeps_of_each_frame_is_found(approach: Capture) -> None:
-    found = memory.growth(Keeping(4000), approach, approach.frames(0, 40))  # type: ignore[arg-type]
+    found = memory.growth(Keeping(4000), approach, received(approach, 40))  # type: ignore[arg-type]
     assert found["memory_growth_bytes"] == pytest.approx(4e6, rel=0.1)
     assert found["growth_frames"] == memory.MEASURED_FRAMES
 
 
 @pytest.mark.usefixtures("patient")
 def test_a_stream_that_keeps_nothing_does_not_grow(approach: Capture) -> None:
-    found = memory.growth(load_detector("null"), approach, approach.frames(0, 40))
+    found = memory.growth(load_detector("null"), approach, received(approach, 40))
     assert found["memory_growth_bytes"] is not None
     assert found["memory_growth_bytes"] < 5000
 
@@ -51,7 +53,7 @@ def test_a_stream_that_keeps_nothing_does_not_grow(approach: Capture) -> None:
 def test_a_slow_detector_is_watched_for_fewer_frames(approach: Capture, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(memory, "LIMIT_S", 0.01)
     monkeypatch.setattr(memory, "MEASURED_FRAMES", 10**7)
-    found = memory.growth(Keeping(4000), approach, approach.frames(0, 40))  # type: ignore[arg-type]
+    found = memory.growth(Keeping(4000), approach, received(approach, 40))  # type: ignore[arg-type]
     assert found["growth_frames"] is not None
     assert 0 < found["growth_frames"] < 10**6
 

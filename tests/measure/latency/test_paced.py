@@ -5,9 +5,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from uwbbench.api import Capture
+from uwbbench.api import Capture, Detections
 from uwbbench.measure.latency import paced
 from uwbbench.measure.latency.paced import paced_pass, paced_summary, responses_us
+from uwbbench.measure.latency.received import received
 
 
 class Clock:
@@ -46,15 +47,16 @@ class Noting:
     def open(self, _: Capture) -> "Noting":
         return self
 
-    def step(self, frames: object) -> None:
+    def step(self, frames: object) -> Detections:
         self.called_s.append(self.clock.now_ns * 1e-9)
         self.frames.append(frames.first)  # type: ignore[attr-defined]
         self.clock.now_ns += int(self.takes_s * 1e9)
+        return Detections.empty()
 
 
 def test_every_frame_is_handed_out_once_and_never_before_it_is_due(approach: Capture, clock: Clock) -> None:
     detector = Noting(clock)
-    times_us, lateness_us = paced_pass(detector, approach, approach.frames(0, 20), 500.0, 0.1)  # type: ignore[arg-type]
+    times_us, lateness_us = paced_pass(detector, approach, received(approach, 20), 500.0, 0.1)  # type: ignore[arg-type]
     assert len(times_us) == len(lateness_us) == 50
     assert detector.frames == list(range(50))
     assert np.all(times_us > 0)
@@ -68,7 +70,7 @@ def test_every_frame_is_handed_out_once_and_never_before_it_is_due(approach: Cap
 def test_a_detector_too_slow_for_the_rate_misses_deadlines_and_the_harness_is_not_blamed(
     approach: Capture, clock: Clock
 ) -> None:
-    found = paced_pass(Noting(clock, 0.004), approach, approach.frames(0, 20), 500.0, 0.04)  # type: ignore[arg-type]
+    found = paced_pass(Noting(clock, 0.004), approach, received(approach, 20), 500.0, 0.04)  # type: ignore[arg-type]
     summary = paced_summary(*found, 500.0)
     assert (summary["n"], summary["missed"], summary["longest_burst"]) == (20, 20, 20)
     assert summary["p50_period_share"] >= 2.0

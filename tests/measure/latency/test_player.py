@@ -8,14 +8,18 @@ from collections.abc import Callable, Iterator
 import numpy as np
 import pytest
 
-from uwbbench.api import Capture, CaptureError
+from uwbbench.api import Capture, CaptureError, Detections
 from uwbbench.detect.pipeline import load_detector
 from uwbbench.measure.latency import player
 from uwbbench.measure.latency.player import Player, in_turns, turn_frames
+from uwbbench.measure.latency.received import received
 
 
 class Recording:
     """A detector that notes whose turn it is and on which frame, in a list that several share."""
+
+    needs: frozenset[str] = frozenset()
+    stages = ()
 
     def __init__(self, name: str, log: list[tuple[str, int]]) -> None:
         self.name, self.log = name, log
@@ -23,12 +27,13 @@ class Recording:
     def open(self, _: Capture) -> "Recording":
         return self
 
-    def step(self, frames: object) -> None:
+    def step(self, frames: object) -> Detections:
         self.log.append((self.name, frames.first))  # type: ignore[attr-defined]
+        return Detections.empty()
 
 
 def recorded(capture: Capture, frames: int, log: list[tuple[str, int]]) -> list[Player]:
-    whole = capture.frames(0, frames)
+    whole = received(capture, frames)
     return [Player(Recording(name, log), capture, whole) for name in "AB"]  # type: ignore[arg-type]
 
 
@@ -50,11 +55,16 @@ def test_both_turns_of_a_block_are_the_same_work_of_streams_of_their_own(approac
         def open(self, _: Capture) -> "Recording":
             seen.append([])
             stream = Recording(self.name, [])
-            mine = seen[-1]
-            stream.step = lambda frames: mine.append(frames.first)  # type: ignore[attr-defined, method-assign]
+            mine, step = seen[-1], stream.step
+
+            def noting(frames: object) -> Detections:
+                mine.append(frames.first)  # type: ignore[attr-defined]
+                return step(frames)
+
+            stream.step = noting  # type: ignore[method-assign]
             return stream
 
-    one = Player(Remembering("A", []), approach, approach.frames(0, 6))  # type: ignore[arg-type]
+    one = Player(Remembering("A", []), approach, received(approach, 6))  # type: ignore[arg-type]
     for _ in range(6):
         one.turn(2)
     assert seen == [[0, 1, 2, 3, 4, 5]] * 2
@@ -78,7 +88,7 @@ def test_taking_turns_again_starts_from_the_first_frame(approach: Capture) -> No
 
 def test_a_capture_without_frames_cannot_be_timed(approach: Capture) -> None:
     with pytest.raises(CaptureError, match="nothing to time"):
-        Player(load_detector("null"), approach, approach.frames(0, 0))
+        Player(load_detector("null"), approach, received(approach, 0))
 
 
 def waiting(reading_ns: Callable[[], int]) -> Callable[[], contextlib.AbstractContextManager[Callable[[], int]]]:
@@ -97,13 +107,14 @@ def test_time_in_which_others_had_the_core_is_left_out(approach: Capture, monkey
     class Interrupted(Recording):
         """Takes 20 ms of every call, of which the core is said to be lost for 15."""
 
-        def step(self, frames: object) -> None:
+        def step(self, frames: object) -> Detections:
             nonlocal waited_ns
             time.sleep(0.02)
             waited_ns += 15_000_000
+            return super().step(frames)
 
     monkeypatch.setattr(player, "core_waits", waiting(lambda: waited_ns))
-    one = Player(Interrupted("A", []), approach, approach.frames(0, 8))  # type: ignore[arg-type]
+    one = Player(Interrupted("A", []), approach, received(approach, 8))  # type: ignore[arg-type]
     start = time.perf_counter()
     spent_s = one.turn(2)
     elapsed_s = time.perf_counter() - start
@@ -114,7 +125,7 @@ def test_time_in_which_others_had_the_core_is_left_out(approach: Capture, monkey
 def test_a_wait_longer_than_what_was_timed_is_none_of_it(approach: Capture, monkeypatch: pytest.MonkeyPatch) -> None:
     seconds = itertools.count()
     monkeypatch.setattr(player, "core_waits", waiting(lambda: next(seconds) * 10**9))
-    one = Player(Recording("A", []), approach, approach.frames(0, 8))  # type: ignore[arg-type]
+    one = Player(Recording("A", []), approach, received(approach, 8))  # type: ignore[arg-type]
     assert one.turn(1) > 0
 
 
@@ -138,10 +149,10 @@ def test_a_turn_is_long_enough_for_the_faster_and_not_too_long_for_the_slower(
 
 def test_the_time_of_a_call_is_found_in_few_calls_of_a_slow_detector(approach: Capture) -> None:
     class Slow(Recording):
-        def step(self, frames: object) -> None:
-            super().step(frames)
+        def step(self, frames: object) -> Detections:
             time.sleep(0.02)
+            return super().step(frames)
 
     log: list[tuple[str, int]] = []
-    assert Player(Slow("A", log), approach, approach.frames(0, 8)).call_s() >= 0.02  # type: ignore[arg-type]
+    assert Player(Slow("A", log), approach, received(approach, 8)).call_s() >= 0.02  # type: ignore[arg-type]
     assert len(log) == 1

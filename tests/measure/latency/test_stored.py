@@ -5,15 +5,21 @@ import shutil
 from pathlib import Path
 
 import numpy as np
+import pyarrow.parquet as pq
 import pytest
 
 from uwbbench.results import Report
+from uwbbench.results.comparison.scores import time_changes
+from uwbbench.results.pareto import speeds_of_run
 from uwbbench.run import run_experiment
 from uwbbench.run.experiment import read_experiment
 from uwbbench.run.folder import RunFolder
 from uwbbench.show.text.report import markdown
 
 ADDED = (
+    "timed",
+    "step",
+    "age",
     "missed_share_low",
     "missed_share_high",
     "clock_us",
@@ -59,6 +65,40 @@ def test_runs_of_earlier_versions_are_still_reported(folder: RunFolder, tmp_path
             }
         lines.append(json.dumps(line))
     journal.write_text("\n".join(lines) + "\n")
+    (times,) = [path for path in (earlier.path / "times").iterdir() if "paced" not in path.name]
+    pq.write_table(pq.read_table(times).select(["time_us"]), times)
     report = Report(earlier)
-    assert report.latency.iloc[0]["n"] == 40
-    assert "THIS MACHINE ONLY" in markdown(report)
+    row = report.latency.iloc[0]
+    assert (row["n"], row["timed"], row["step_p50_us"]) == (40, "step", row["p50_us"])
+    text = markdown(report)
+    assert "THIS MACHINE ONLY" in text
+    assert "null: measured by an earlier version, which timed the step alone" in text
+    assert "of the step alone, and hold on this machine only" in text
+    (unit,) = [entry.unit for entry in earlier.entries() if entry.kind == "latency"]
+    assert np.array_equal(earlier.step_times_us(unit), earlier.times_us(unit))
+
+
+def test_times_of_the_step_alone_are_not_compared_with_times_to_rows(folder: RunFolder, tmp_path: Path) -> None:
+    earlier = RunFolder(shutil.copytree(folder.path, tmp_path / "earlier"))
+    journal = earlier.path / "journal.jsonl"
+    lines = [json.loads(line) for line in journal.read_text().splitlines()]
+    for line in lines:
+        line["facts"].pop("timed", None)
+    journal.write_text("".join(json.dumps(line) + "\n" for line in lines))
+    assert time_changes(folder, folder)[0]
+    compared, missing = time_changes(earlier, folder)
+    assert compared == []
+    assert missing == [
+        "times not compared: those of the first run are of the step alone, of the second from samples to rows"
+    ]
+    mixed = [*folder.entries(), *earlier.entries()]
+    assert {speed.timed for speed in speeds_of_run(mixed).values()} == {"samples to rows"}
+
+
+def test_the_step_alone_of_every_call_is_stored_beside_its_time(folder: RunFolder) -> None:
+    (entry,) = [entry for entry in folder.entries() if entry.kind == "latency"]
+    step_us = folder.step_times_us(entry.unit)
+    assert np.all(step_us < folder.times_us(entry.unit))
+    assert entry.facts["step"]["p50_us"] == np.median(step_us)
+    row = Report(folder).latency.iloc[0]
+    assert (row["timed"], row["step_p50_us"]) == ("samples to rows", np.median(step_us))

@@ -165,7 +165,7 @@ def score(
         With ``range_m``; with ``x_m``, ``y_m`` and ``cluster`` too for the mapping table.
     capture : Capture or CaptureHeader
         Its samples are not touched.
-    scoring : {"frame", "peak", "object"}
+    scoring : {"frame", "peak", "object", "latest"}
     gate_m : float
         Largest error of a true detection, inclusive.
     region : Region, optional
@@ -182,7 +182,8 @@ def score(
     ------
     ScoringError
         If the capture has no truth, the detections are of another capture or lack a range, ``peak`` is asked for and
-        the peaks before the filters are not known, or a parameter is not allowed.
+        the peaks before the filters are not known, ``latest`` and it is not known when the detections were handed out,
+        or a parameter is not allowed.
     """
     rules = ScoringRules(scoring, gate_m, region or Region(), strongest, surface)
     scene = Scene.of(found, capture)

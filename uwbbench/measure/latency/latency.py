@@ -2,8 +2,10 @@
 
 Conventions
 -----------
-* Times are wall-clock microseconds of single calls, one frame a call. Reading and slicing frames is not part of them.
-  Nothing is subtracted: what the harness itself takes is a number of its own.
+* Times are wall-clock microseconds of single calls, one frame a call, *from samples to rows*: from the raw samples of
+  the frame in memory to what was found as plain records. The step of the detector alone is given beside it (``step``).
+  Reading from disk is not part of either. Nothing is subtracted: what uwbbench itself takes is a number of its own.
+* Records that earlier versions stored are of the step alone, and say nothing of what they are of: ``timed``.
 * A percentile needs enough calls for a two-sided 95 % interval: 36 for P90, 72 for P95, 368 for P99; with fewer it is
   None.
 * Bounds of a share of missed deadlines are exact (Clopper and Pearson) for independent calls. Late calls tend to come
@@ -24,7 +26,10 @@ from uwbbench.measure.accuracy.stats import clopper_pearson
 
 SAMPLES_NEEDED = {90: 36, 95: 72, 99: 368}
 
-_CALLS = ("times_us", "paced_times_us")
+_CALLS = ("times_us", "step_us", "paced_times_us")
+
+ROWS, STEP = "samples to rows", "step"
+"""What times are of."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,16 +38,20 @@ class Latency:
 
     Attributes
     ----------
+    timed : {"samples to rows", "step"}
+        What all times without another word are of.
     p50_us, p90_us, p95_us, p99_us, mean_us, max_us : float or None
         Of single calls, one frame each.
+    step : dict or None
+        The same numbers of the step alone, measured inside the same calls; None where the times are of it anyway.
     n : int
         Calls behind them.
     throughput_us, throughput_best_us : float
-        Median and best time a frame of repeated batch runs.
+        Median and best time a frame of repeated batch runs, from samples to detections.
     amortised_us : float
         Mean time a frame of the stream, the final flush included: rare expensive frames are spread over all.
     overhead_us : float
-        Median time a frame of the null detector in the same loop: what the measurement itself costs.
+        Median time a frame of the null detector in the same loop: what uwbbench and the measurement cost by themselves.
     clock_us : float or None
         Median time between two readings of the clock with nothing between them; part of every call.
     startup_s : float
@@ -61,6 +70,9 @@ class Latency:
     clustering, plain : dict or None
         Calls in which the detector clustered, and the others (``n``, ``share``, ``p50_us``, ``p90_us``, ``p95_us``,
         ``p99_us``, ``mean_us``, ``max_us``); None where it does not count them.
+    age : dict or None
+        How long after the arrival of its frame a detection was handed out
+        (:func:`~uwbbench.measure.accuracy.age.age_summary`); None without detections.
     ratio_to_reference : dict or None
         Time relative to a reference detector over alternating blocks: ``reference``, and what
         :func:`~uwbbench.measure.latency.ratio.ratio_summary` gives, with ``disturbed_blocks``: in how many of the
@@ -90,7 +102,7 @@ class Latency:
     machine : dict
         The machine (:func:`~uwbbench.measure.latency.machine.machine`), the ``core`` that was used, and ``versions``.
     notes : list of str
-    times_us : (n,) array
+    times_us, step_us : (n,) array
         Every call.
     paced_times_us : (frames,) array
         Every call of the paced pass.
@@ -121,6 +133,9 @@ class Latency:
     cpu: str
     notes: list[str] = field(default_factory=list)
     # Values of a record may be missing in runs that were stored before it held them: they have defaults.
+    timed: str = STEP
+    step: dict[str, Any] | None = None
+    age: dict[str, Any] | None = None
     missed_share_low: float | None = None
     missed_share_high: float | None = None
     clock_us: float | None = None
@@ -134,6 +149,7 @@ class Latency:
     quality: dict[str, Any] = field(default_factory=dict)
     machine: dict[str, Any] = field(default_factory=dict)
     times_us: FloatArray = field(repr=False, default_factory=lambda: np.empty(0))
+    step_us: FloatArray = field(repr=False, default_factory=lambda: np.empty(0))
     paced_times_us: FloatArray = field(repr=False, default_factory=lambda: np.empty(0))
 
     def to_dict(self) -> dict[str, Any]:

@@ -11,9 +11,8 @@ from pathlib import Path
 from time import perf_counter
 
 from uwbbench.api.capture import Capture
-from uwbbench.api.frames import Frames
 from uwbbench.detect.pipeline import Pipeline
-from uwbbench.measure.latency.loops import endless
+from uwbbench.measure.latency.received import laps
 
 SETTLING_FRAMES = 300
 """Frames after which a stream's buffers have their size."""
@@ -41,7 +40,7 @@ def resident_bytes() -> int | None:
     return int(statm.read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
 
 
-def growth(pipeline: Pipeline, capture: Capture, preloaded: Frames) -> dict[str, float | int | None]:
+def growth(pipeline: Pipeline, capture: Capture, frames: Capture) -> dict[str, float | int | None]:
     """What one long stream keeps of every thousand frames once it has settled.
 
     Two streams are run, as watching allocations takes memory itself: one for the resident size, one for the objects.
@@ -52,8 +51,9 @@ def growth(pipeline: Pipeline, capture: Capture, preloaded: Frames) -> dict[str,
     pipeline : Pipeline
         Warmed up before.
     capture : Capture
-    preloaded : Frames
-        Of the capture; gone through again and again.
+        That streams are opened for.
+    frames : Capture
+        Received frames of it; gone through again and again.
 
     Returns
     -------
@@ -62,34 +62,36 @@ def growth(pipeline: Pipeline, capture: Capture, preloaded: Frames) -> dict[str,
         ``resident_growth_bytes``: resident size of the process, which has the grain of pages and holds what the
         allocator keeps, None where unknown; ``growth_frames``: frames between the two readings of the first.
     """
-    resident, _ = _grown(pipeline, capture, preloaded, resident_bytes)
+    resident, _ = _grown(pipeline, capture, frames, resident_bytes)
     tracemalloc.start()
     try:
-        held, frames = _grown(pipeline, capture, preloaded, lambda: tracemalloc.get_traced_memory()[0])
+        held, count = _grown(pipeline, capture, frames, lambda: tracemalloc.get_traced_memory()[0])
     finally:
         tracemalloc.stop()
-    return {"memory_growth_bytes": held, "resident_growth_bytes": resident, "growth_frames": frames}
+    return {"memory_growth_bytes": held, "resident_growth_bytes": resident, "growth_frames": count}
 
 
 def _grown(
-    pipeline: Pipeline, capture: Capture, preloaded: Frames, reading: Callable[[], int | None]
+    pipeline: Pipeline, capture: Capture, frames: Capture, reading: Callable[[], int | None]
 ) -> tuple[float | None, int]:
     """Growth of a reading for 1 000 frames of one stream, and the frames that it was seen over."""
     stream = pipeline.open(capture)
-    step = stream.step
-    source = endless(preloaded, 1 / capture.radar.frame_rate_hz, renumbered="truth" not in stream.needs)
+    source, numbers = laps(frames, SETTLING_FRAMES + MEASURED_FRAMES, renumbered="truth" not in stream.needs)
+    step, receive, sts = stream.step, source.frames, "sts" in stream.needs
+    coming = iter(numbers)
 
-    def run(frames: int, limit_s: float) -> int:
+    def run(most: int, limit_s: float) -> int:
         until = perf_counter() + limit_s
         done = 0
-        while done < frames and (perf_counter() < until or not done):  # one at least, whoever has the core meanwhile
-            step(next(source))
+        while done < most and (perf_counter() < until or not done):  # one at least, whoever has the core meanwhile
+            frame = next(coming)
+            step(receive(frame, frame + 1, sts=sts)).records()
             done += 1
         gc.collect()
         return done
 
     run(SETTLING_FRAMES, LIMIT_S / 3)
     before = reading()
-    frames = run(MEASURED_FRAMES, LIMIT_S)
+    count = run(MEASURED_FRAMES, LIMIT_S)
     after = reading()
-    return (None if before is None or after is None else (after - before) * 1000 / frames), frames
+    return (None if before is None or after is None else (after - before) * 1000 / count), count

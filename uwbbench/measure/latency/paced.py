@@ -4,7 +4,8 @@ Conventions
 -----------
 * A frame is due at a fixed time. The loop sleeps until shortly before, then watches the clock, as a sleep alone ends
   some 0.1 ms late. What it starts late nevertheless is the harness's lateness: kept apart, never the detector's.
-* A frame is made after the sleep, as by a driver that has just received it: only its samples are not cold.
+* The call of a frame begins with its raw samples, as a driver has just received them, and ends with its rows as plain
+  records.
 * The deadline of a frame is the next frame. A detector that takes longer makes the next frame wait, and the wait
   counts: the response of a frame is its call and what earlier calls left undone when it was due.
 """
@@ -19,10 +20,10 @@ import numpy as np
 
 from uwbbench.api.arrays import FloatArray
 from uwbbench.api.capture import Capture
-from uwbbench.api.frames import Frames
 from uwbbench.detect.pipeline import Pipeline
 from uwbbench.measure.latency.latency import call_summary, miss_summary
-from uwbbench.measure.latency.loops import endless, quiet
+from uwbbench.measure.latency.loops import quiet
+from uwbbench.measure.latency.received import laps
 
 SPIN_S = 0.3e-3
 """The clock is watched for this long: longer than sleeps end late, short enough that the loop leaves caches alone."""
@@ -32,7 +33,7 @@ LATE_START_US = 10.0
 
 
 def paced_pass(
-    pipeline: Pipeline, capture: Capture, preloaded: Frames, rate_hz: float, seconds: float
+    pipeline: Pipeline, capture: Capture, frames: Capture, rate_hz: float, seconds: float
 ) -> tuple[FloatArray, FloatArray]:
     """Hand out frames at a rate, for a while, to one stream.
 
@@ -41,8 +42,9 @@ def paced_pass(
     pipeline : Pipeline
         Warmed up before.
     capture : Capture
-    preloaded : Frames
-        Preloaded; starts again where it is shorter than that.
+        That the stream is opened for.
+    frames : Capture
+        Received frames of it; they start again where they are shorter than that.
     rate_hz, seconds : float
 
     Returns
@@ -53,23 +55,23 @@ def paced_pass(
         From the moment at which the call could have started (the frame was due and the detector free) to its start.
     """
     stream = pipeline.open(capture)
-    step, source = stream.step, endless(preloaded, 1 / rate_hz, renumbered="truth" not in stream.needs)
     count = max(1, round(seconds * rate_hz))
+    source, numbers = laps(frames, count, renumbered="truth" not in stream.needs)
+    step, receive, sts = stream.step, source.frames, "sts" in stream.needs
     period_ns, spin_ns = 1e9 / rate_hz, min(SPIN_S, 0.25 / rate_hz) * 1e9
     times_ns, lateness_ns = np.empty(count), np.empty(count)
     with quiet():
         begin = perf_counter_ns() + int(period_ns)
         ended = begin
-        for number in range(count):
+        for number, frame in enumerate(numbers):
             due = begin + int(number * period_ns)
             idle_ns = due - perf_counter_ns() - spin_ns
             if idle_ns > 0:
                 time.sleep(idle_ns * 1e-9)
-            frames = next(source)
             start = perf_counter_ns()
             while start < due:
                 start = perf_counter_ns()
-            step(frames)
+            step(receive(frame, frame + 1, sts=sts)).records()
             free, ended = max(due, ended), perf_counter_ns()
             times_ns[number], lateness_ns[number] = ended - start, start - free
     return times_ns * 1e-3, lateness_ns * 1e-3

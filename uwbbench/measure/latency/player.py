@@ -2,7 +2,8 @@
 
 What a turn is
 --------------
-* A turn is the time of some consecutive frames of a capture, one frame a call. It lasts ``TURN_S`` or longer, thousands
+* A turn is the time of some consecutive frames of a capture, one frame a call, each from its raw samples to its rows
+  as plain records. It lasts ``TURN_S`` or longer, thousands
   of readings of the clock, and has ``TURN_FRAMES`` frames or more, so that work that comes every fifty, such as
   clustering, is part of every turn. Both hold unless the slowest detector would take longer than ``LONGEST_TURN_S`` for
   them: beside a fast reference, a slow one would be timed for minutes. The parts of a capture are equally long, and
@@ -29,10 +30,9 @@ import numpy as np
 from uwbbench.api.arrays import FloatArray
 from uwbbench.api.capture import Capture
 from uwbbench.api.errors import CaptureError
-from uwbbench.api.frames import Frames
 from uwbbench.detect.pipeline import Pipeline
 from uwbbench.measure.latency.counters import core_waits
-from uwbbench.measure.latency.loops import cut, stream_pass, warm_up
+from uwbbench.measure.latency.loops import stream_pass, timed_calls, warm_up
 from uwbbench.measure.latency.paced import paced_pass, responses_us
 from uwbbench.measure.latency.ratio import alternate
 
@@ -45,14 +45,15 @@ PROBED_S = 0.01
 
 
 class Player:
-    """A detector with preloaded frames of a capture, which two streams of it go through again and again.
+    """A detector with received frames of a capture, which two streams of it go through again and again.
 
     Parameters
     ----------
     pipeline : Pipeline
     capture : Capture
-    whole : Frames
-        The preloaded frames.
+        That streams are opened for.
+    whole : Capture
+        Its received frames (:func:`~uwbbench.measure.latency.received.received`).
 
     Attributes
     ----------
@@ -65,7 +66,7 @@ class Player:
         If there are no frames.
     """
 
-    def __init__(self, pipeline: Pipeline, capture: Capture, whole: Frames) -> None:
+    def __init__(self, pipeline: Pipeline, capture: Capture, whole: Capture) -> None:
         self.pipeline, self.capture, self.whole = pipeline, capture, whole
         if not len(self.whole):
             raise CaptureError(f"capture '{capture.name}' has no frames; there is nothing to time")
@@ -74,8 +75,8 @@ class Player:
 
     @property
     def content(self) -> str:
-        """SHA-256 of the loaded samples: players are only compared where it is the same."""
-        return hashlib.sha256(np.ascontiguousarray(self.whole.preamble).tobytes()).hexdigest()
+        """SHA-256 of the raw samples: players are only compared where it is the same."""
+        return hashlib.sha256(np.asarray(self.whole.preamble[:]).tobytes()).hexdigest()
 
     def warm_up(self, windows: int) -> None:
         """Run until the times settle, so many windows at most."""
@@ -83,27 +84,25 @@ class Player:
 
     def call_s(self) -> float:
         """Median time of the first calls: enough of them to choose the length of turns."""
-        step = self.pipeline.open(self.capture).step
-        times_ns: list[int] = []
-        for frames in cut(self.whole.part(0, 1000), 1):
-            start_ns = perf_counter_ns()
-            step(frames)
-            times_ns.append(perf_counter_ns() - start_ns)
-            if sum(times_ns) > PROBED_S * 1e9:
+        stream = self.pipeline.open(self.capture)
+        times_us: list[float] = []
+        for frame in range(min(1000, len(self.whole))):
+            times_us += timed_calls(stream, self.whole, frame, frame + 1).times_us.tolist()
+            if sum(times_us) > PROBED_S * 1e6:
                 break
-        return max(float(np.median(times_ns)), 1.0) * 1e-9
+        return max(float(np.median(times_us)) * 1e-6, 1e-9)
 
     def turn(self, size: int) -> float:
         """Time of ``size`` frames, in seconds: of the first stream, then of the second on the same, then of the next.
 
-        Where too few frames are left, the capture starts again. Opening streams and cutting frames is not part of the
-        time, nor is waiting for the core while other processes have it, where the system counts that. What the detector
-        waits for by itself, such as a file, is.
+        The time is that from samples to rows. Where too few frames are left, the capture starts again. Opening streams
+        is not part of the time, nor is waiting for the core while other processes have it, where the system counts
+        that. What the detector waits for by itself, such as a file, is.
         """
         if not self._again and self._at + size > len(self.whole):
             self._reopen()
-        calls = cut(self.whole.part(self._at, self._at + size), 1)
-        step = self._streams[self._again].step
+        stream, receive, frames = self._streams[self._again], self.whole.frames, range(self._at, self._at + size)
+        step, sts = stream.step, "sts" in stream.needs
         if self._again:
             self._at += size
         self._again = not self._again
@@ -112,8 +111,8 @@ class Player:
             with core_waits() as waits_ns:
                 before_ns = waits_ns()
                 start_ns = perf_counter_ns()
-                for frames in calls:
-                    step(frames)
+                for frame in frames:
+                    step(receive(frame, frame + 1, sts=sts)).records()
                 spent_ns = perf_counter_ns() - start_ns
                 waited_ns = waits_ns() - before_ns
         finally:
@@ -149,7 +148,7 @@ class Player:
             times_us, _ = paced_pass(self.pipeline, self.capture, self.whole, rate_hz, count / rate_hz)
         else:
             passes = -(-count // len(self.whole))
-            one_by_one = [stream_pass(self.pipeline, self.capture, self.whole)[0] for _ in range(passes)]
+            one_by_one = [stream_pass(self.pipeline, self.capture, self.whole).times_us for _ in range(passes)]
             times_us = np.concatenate(one_by_one)[:count]
         return responses_us(times_us, 1e6 / rate_hz)
 

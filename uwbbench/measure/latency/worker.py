@@ -17,10 +17,10 @@ import numpy as np
 import yaml
 
 if TYPE_CHECKING:
-    from uwbbench.api.arrays import BoolArray, FloatArray
+    from uwbbench.api.arrays import FloatArray
     from uwbbench.api.capture import Capture
-    from uwbbench.api.frames import Frames
     from uwbbench.detect.pipeline import Pipeline
+    from uwbbench.measure.latency.loops import Pass
 
 
 def main() -> int:
@@ -57,44 +57,46 @@ def _measured(spec: dict[str, Any], core: int | None) -> dict[str, Any]:
     from uwbbench.measure.latency import loops, memory
     from uwbbench.measure.latency.compilations import undisturbed
     from uwbbench.measure.latency.machine import load
+    from uwbbench.measure.latency.received import received
 
     load_before = load()
     pipeline = _pipeline(spec["detector"])
     opening = perf_counter()
     capture = CaptureRef(**{**spec["capture"], "roots": tuple(spec["capture"]["roots"])}).open()
-    preloaded = capture.frames(0, spec["frames"])
+    frames = received(capture, spec["frames"])
     opening_s = perf_counter() - opening
-    if len(preloaded) == 0:
+    if len(frames) == 0:
         raise CaptureError(f"capture '{capture.name}' has no frames; there is nothing to time")
-    stream = pipeline.open(capture)
-    stream.step(preloaded.part(0, 1))
+    pipeline.open(capture).step(frames.frames(0, 1)).records()
     startup_s = perf_counter() - spec["started"] - opening_s
 
-    warmed = loops.warm_up(pipeline, capture, preloaded, spec["warmup_windows"])
+    warmed = loops.warm_up(pipeline, capture, frames, spec["warmup_windows"])
     notes = [] if warmed else ["warm-up windows never agreed within 5 %"]
-    if len(capture) > len(preloaded):
-        notes.append(f"timed the first {len(preloaded)} of {len(capture)} frames")
-    calls, compiled_in_calls = _calls(pipeline, capture, preloaded)
+    if len(capture) > len(frames):
+        notes.append(f"timed the first {len(frames)} of {len(capture)} frames")
+    calls, compiled_in_calls = _calls(pipeline, capture, frames)
     peak_memory_bytes = memory.peak_bytes()
-    batch_us, compiled_in_batch = undisturbed(lambda: loops.batch_times_us(pipeline, capture, preloaded))
-    paced, compiled_in_paced = _paced(pipeline, capture, preloaded, spec)
+    batch_us, compiled_in_batch = undisturbed(lambda: loops.batch_times_us(pipeline, capture, frames))
+    paced, compiled_in_paced = _paced(pipeline, capture, frames, spec)
     preempted = calls["quality"].get("involuntary_switches", 0)
     if preempted > 0.01 * calls["n"]:
         notes.append(f"other processes took the core {preempted} times in {calls['n']} calls: tails are partly theirs")
-    ratio, compiled_in_pair = _ratio(pipeline, capture, preloaded, spec)
+    ratio, compiled_in_pair = _ratio(pipeline, capture, frames, spec)
     compilations = compiled_in_calls + compiled_in_batch + compiled_in_paced + compiled_in_pair
     if compilations:
         notes.append("code was compiled during the timed passes: some times hold that of the compiler")
-    instructions, instructions_note = _instructions(pipeline, capture, preloaded)
+    instructions, instructions_note = _instructions(pipeline, capture, frames)
     null = _pipeline({"schema": 1, "name": "idle", "pipeline": [{"use": registry.default("stage.idle")}]})
-    loops.warm_up(null, capture, preloaded, spec["warmup_windows"])
-    overhead_us, _, _ = loops.stream_pass(null, capture, preloaded)
-    growth = memory.growth(pipeline, capture, preloaded)
+    loops.warm_up(null, capture, frames, spec["warmup_windows"])
+    overhead_us = loops.stream_pass(null, capture, frames).times_us
+    growth = memory.growth(pipeline, capture, frames)
     os_threads, threads = _os_threads(), _threads()
+    age = _age(pipeline, capture, frames, np.array(calls["times_us"]))
     if threads > 1:
         notes.append(f"a numerical library would use {threads} threads")
     return {
         **calls,
+        "age": age,
         "throughput_us": float(np.median(batch_us)),
         "throughput_best_us": float(batch_us.min()),
         "overhead_us": float(np.median(overhead_us)),
@@ -120,30 +122,42 @@ def _measured(spec: dict[str, Any], core: int | None) -> dict[str, Any]:
     }
 
 
-def _calls(pipeline: Pipeline, capture: Capture, preloaded: Frames) -> tuple[dict[str, Any], int]:
+def _calls(pipeline: Pipeline, capture: Capture, frames: Capture) -> tuple[dict[str, Any], int]:
     """The stream, one frame a call, and how often something was compiled in it."""
     from uwbbench.measure.latency import latency, loops
     from uwbbench.measure.latency.compilations import undisturbed
     from uwbbench.measure.latency.counters import Usage
 
-    def once() -> tuple[FloatArray, BoolArray | None, float, dict[str, int]]:
+    def once() -> tuple[Pass, dict[str, int]]:
         before = Usage.now()
-        passed = loops.stream_pass(pipeline, capture, preloaded)
+        passed = loops.stream_pass(pipeline, capture, frames)
         after = Usage.now()
-        return *passed, {} if before is None or after is None else after.since(before)
+        return passed, {} if before is None or after is None else after.since(before)
 
-    (times_us, clustered, flush_us, usage), compilations = undisturbed(once)
+    (passed, usage), compilations = undisturbed(once)
+    times_us = passed.times_us
     figures = {
+        "timed": latency.ROWS,
         **latency.call_summary(times_us, 1e6 / capture.radar.frame_rate_hz),
-        **latency.kinds_summary(times_us, clustered),
-        "amortised_us": float(times_us.sum() + flush_us) / len(times_us),
+        "step": latency.distribution(passed.step_us),
+        **latency.kinds_summary(times_us, passed.clustered),
+        "amortised_us": float(times_us.sum() + passed.flush_us) / len(times_us),
         "quality": usage,
         "times_us": times_us.tolist(),
+        "step_us": passed.step_us.tolist(),
     }
     return figures, compilations
 
 
-def _paced(pipeline: Pipeline, capture: Capture, preloaded: Frames, spec: dict[str, Any]) -> tuple[dict[str, Any], int]:
+def _age(pipeline: Pipeline, capture: Capture, frames: Capture, times_us: FloatArray) -> dict[str, Any] | None:
+    """How late detections are handed out; a pass of its own, whose streams see the frames that were timed."""
+    from uwbbench.detect.hand_out import driven
+    from uwbbench.measure.accuracy.age import age_summary
+
+    return age_summary(driven(pipeline.open(capture), frames), frames.trajectory.timestamp_s, times_us)
+
+
+def _paced(pipeline: Pipeline, capture: Capture, frames: Capture, spec: dict[str, Any]) -> tuple[dict[str, Any], int]:
     """Frames at a fixed rate, where that was asked for, and how often something was compiled meanwhile."""
     from uwbbench.measure.latency import paced
     from uwbbench.measure.latency.compilations import undisturbed
@@ -152,14 +166,14 @@ def _paced(pipeline: Pipeline, capture: Capture, preloaded: Frames, spec: dict[s
         return {}, 0
     rate_hz = spec["rate_hz"] or capture.radar.frame_rate_hz
     (times_us, lateness_us), compilations = undisturbed(
-        lambda: paced.paced_pass(pipeline, capture, preloaded, rate_hz, spec["paced_s"]), tries=1
+        lambda: paced.paced_pass(pipeline, capture, frames, rate_hz, spec["paced_s"]), tries=1
     )
     summary = paced.paced_summary(times_us, lateness_us, rate_hz)
     return {"paced": summary, "paced_times_us": times_us.tolist()}, compilations
 
 
 def _ratio(
-    pipeline: Pipeline, capture: Capture, preloaded: Frames, spec: dict[str, Any]
+    pipeline: Pipeline, capture: Capture, frames: Capture, spec: dict[str, Any]
 ) -> tuple[dict[str, Any] | None, int]:
     """Alternating with the reference, where there is one, and how often something was compiled meanwhile."""
     from uwbbench.measure.latency.compilations import undisturbed
@@ -169,10 +183,10 @@ def _ratio(
     if spec["reference"] is None:
         return None, 0
     reference = _pipeline(spec["reference"])
-    players = [Player(timed, capture, preloaded) for timed in (pipeline, reference)]
+    players = [Player(timed, capture, frames) for timed in (pipeline, reference)]
     players[1].warm_up(spec["warmup_windows"])
-    size = turn_frames([player.call_s() for player in players], len(preloaded))
-    blocks = max(spec["blocks"], len(preloaded) // size)  # all frames count in the ratio of all time together
+    size = turn_frames([player.call_s() for player in players], len(frames))
+    blocks = max(spec["blocks"], len(frames) // size)  # all frames count in the ratio of all time together
     times_s, compilations = undisturbed(lambda: in_turns(players, size, blocks))
     waited_s = np.reshape([player.waited_s for player in players], (-1, blocks, 2))
     disturbed = int(np.count_nonzero(waited_s.any(axis=(0, 2))))
@@ -180,20 +194,21 @@ def _ratio(
     return {"reference": reference.name, **ratio, "disturbed_blocks": disturbed}, compilations
 
 
-def _instructions(pipeline: Pipeline, capture: Capture, preloaded: Frames) -> tuple[float | None, str]:
+def _instructions(pipeline: Pipeline, capture: Capture, frames: Capture) -> tuple[float | None, str]:
     """Instructions a frame, in a pass of its own."""
     from uwbbench.measure.latency import loops
     from uwbbench.measure.latency.counters import counted
 
-    step, calls = pipeline.open(capture).step, loops.cut(preloaded, 1)
+    stream = pipeline.open(capture)
+    step, receive, sts = stream.step, frames.frames, "sts" in stream.needs
 
     def work() -> None:
-        for frames in calls:
-            step(frames)
+        for frame in range(len(frames)):
+            step(receive(frame, frame + 1, sts=sts)).records()
 
     with loops.quiet():
         count, note = counted(work)
-    return None if count is None else count / len(calls), note
+    return None if count is None else count / len(frames), note
 
 
 def _pipeline(data: dict[str, Any]) -> Pipeline:

@@ -5,8 +5,9 @@ Conventions
 * Both runs are judged again under the rules of the first one, so that what differs is what was detected.
 * Differences are second minus first, on the same captures, with intervals over scenes; p-values are adjusted after
   Holm over the detectors of a dataset, scoring and table, for each metric.
-* Of times only the ratio to the reference is compared, and only where both used the same reference. Its interval is
-  that of two independent log-normal values, each inside its run; it does not know how much processes differ.
+* Of times only the ratio to the reference is compared, and only where both used the same reference and timed the same.
+  Its interval is that of two independent log-normal values, each inside its run; it does not know how much processes
+  differ.
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ from uwbbench.measure.accuracy.stats import Difference, evaluate, paired_differe
 from uwbbench.results.comparison.units import Unit
 from uwbbench.results.pareto import NORMAL_975, Speed, speeds_of_run
 from uwbbench.results.slices import Board
+from uwbbench.results.times import WORDS
 from uwbbench.run.folder.folder import RunFolder
 
 
@@ -142,6 +144,10 @@ def time_changes(first: RunFolder, second: RunFolder) -> tuple[list[TimeChange],
     for (dataset, detector), before in sides[0].items():
         after = sides[1].get((dataset, detector))
         if after is None:
+            continue
+        if before.timed != after.timed:
+            kinds = WORDS[before.timed], WORDS[after.timed]
+            missing[f"times not compared: those of the first run are {kinds[0]}, of the second {kinds[1]}"] = None
             continue
         if before.reference != after.reference or identities[0] != identities[1]:
             missing["times not compared: the references differ"] = None

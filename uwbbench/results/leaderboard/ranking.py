@@ -27,6 +27,7 @@ from uwbbench.results.leaderboard.suites import Contender, Suite
 from uwbbench.results.pareto import Speed, speed_of
 from uwbbench.results.results import Scored, estimates_of
 from uwbbench.results.slices import Board
+from uwbbench.results.times import timed_of
 from uwbbench.results.verdicts import Pair, Ranks, ranks_of
 from uwbbench.run.folder.journal import Entry
 
@@ -136,17 +137,20 @@ def _ranking(suite: Suite, board: Board, members: Mapping[str, list[Scored]]) ->
 # Times ---------------------------------------------------------------------------------------------------------
 
 
-def reference_of(suite: Suite) -> tuple[str, str] | None:
-    """Name and identity of the reference that most detectors were timed against; None where nothing was timed."""
-    uses: Counter[tuple[str, str]] = Counter()
+def reference_of(suite: Suite) -> tuple[str, str, str] | None:
+    """Name and identity of the reference that most detectors were timed against, and what the times are of.
+
+    None where nothing was timed.
+    """
+    uses: Counter[tuple[str, str, str]] = Counter()
     for contender in suite.contenders:
         uses.update({key for run, entry in contender.timed if (key := _reference(run, entry)) is not None})
     return max(uses, key=lambda key: (uses[key], key)) if uses else None
 
 
-def _reference(run: Run, entry: Entry) -> tuple[str, str] | None:
+def _reference(run: Run, entry: Entry) -> tuple[str, str, str] | None:
     ratio = entry.facts["ratio_to_reference"]
-    return (ratio["reference"], run.manifest["reference"]) if ratio else None
+    return (ratio["reference"], run.manifest["reference"], timed_of(entry.facts)) if ratio else None
 
 
 def speeds_by_machine(suite: Suite, contender: Contender, dataset: str) -> dict[str, Speed]:
@@ -198,4 +202,5 @@ def _together(speeds: Sequence[Speed], *, one_machine: bool) -> Speed:
         captures=max(speed.captures for speed in speeds),
         deadline=speeds[0].deadline if one_machine else math.nan,
         p50_us=math.nan,
+        timed=speeds[0].timed,
     )

@@ -214,7 +214,9 @@ class RunFolder:
 
     # Times -----------------------------------------------------------------------------------------------------
 
-    def write_times(self, unit: str, times_us: FloatArray, latency: Mapping[str, Any]) -> None:
+    def write_times(
+        self, unit: str, times_us: FloatArray, latency: Mapping[str, Any], step_us: FloatArray | None = None
+    ) -> None:
         """Store the time of every call of a latency pass, and its summary.
 
         Parameters
@@ -222,17 +224,27 @@ class RunFolder:
         unit : str
             Identifier of the unit.
         times_us : (calls,) array
+            Of what the summary says under ``timed``.
         latency : mapping
             Summary as plain values.
+        step_us : (calls,) array, optional
+            Time of the detector's step alone in each call.
         """
         import pyarrow as pa
 
-        write_parquet(self._file("times", unit), pa.table({"time_us": times_us}), latency)
+        columns = {"time_us": times_us} | ({} if step_us is None else {"step_us": step_us})
+        write_parquet(self._file("times", unit), pa.table(columns), latency)
 
     def times_us(self, unit: str) -> FloatArray:
-        """Time of every call (frames,) of a latency pass."""
+        """Time of every call (frames,) of a latency pass, from samples to rows; in older runs of the step alone."""
         table, _ = read_parquet(self._file("times", unit))
         return np.asarray(table.column("time_us").to_numpy(), dtype=np.float64)
+
+    def step_times_us(self, unit: str) -> FloatArray:
+        """Time of the detector's step alone in every call (frames,) of a latency pass."""
+        table, _ = read_parquet(self._file("times", unit))
+        name = "step_us" if "step_us" in table.column_names else "time_us"
+        return np.asarray(table.column(name).to_numpy(), dtype=np.float64)
 
     # Scores and report -----------------------------------------------------------------------------------------
 

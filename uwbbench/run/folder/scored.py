@@ -75,7 +75,8 @@ def with_causes(
     Parameters
     ----------
     rows : iterable of mapping
-        Of :func:`score_rows`; those that are not scored stay as they are.
+        Of :func:`score_rows`; those that are not scored stay as they are, and so do those by the latest answer, whose
+        errors may be those of another frame.
     detections : Detections
         With their candidates; without them the causes of misses are not known.
     scene : Scene
@@ -86,7 +87,7 @@ def with_causes(
     by_name = {rule.scoring: rule for rule in rules}
     completed = [dict(row) for row in rows]
     for row in completed:
-        if row["status"] == "scored":
+        if row["status"] == "scored" and row["scoring"] != "latest":
             row[CAUSES] = canonical(causes(detections, scene, by_name[row["scoring"]], row["table"]).to_dict())
     return completed
 

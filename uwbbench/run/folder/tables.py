@@ -10,7 +10,7 @@ import numpy as np
 
 from uwbbench.api.arrays import IntArray
 from uwbbench.api.capture import CaptureHeader
-from uwbbench.api.detections import Detections
+from uwbbench.api.detections import HANDED_OUT, Detections
 from uwbbench.api.radar import Radar
 from uwbbench.api.truth import Obstacle, Trajectory, Truth
 from uwbbench.measure.accuracy.ranked import RankedCounts
@@ -38,14 +38,17 @@ def from_spans(spans: Iterable[Sequence[int]]) -> IntArray:
 
 
 def write_detections(path: Path, detections: Detections) -> None:
-    """Store detections with the frames that were processed, the notes and the chain."""
+    """Store detections with the frames that were processed, the notes, the chain, and when they were handed out."""
     import pyarrow as pa
 
-    facts = {
+    facts: dict[str, Any] = {
         "processed": as_spans(detections.processed),
         "notes": detections.notes,
         "chain": list(detections.chain.items()),
     }
+    if detections.answered is not None:
+        at_once = np.array_equal(detections.answered, detections.processed)
+        facts["answered"] = "at once" if at_once else detections.answered.tolist()
     write_parquet(path, pa.table(dict(detections.columns)), facts)
 
 
@@ -53,13 +56,17 @@ def read_detections(path: Path, candidates: Path | None = None) -> Detections:
     """Stored detections; with their candidates where those are given."""
     table, facts = read_parquet(path)
     columns: dict[str, Any] = {name: table.column(name).to_numpy() for name in table.column_names}
-    return Detections(
+    read = Detections(
         **columns,
         processed=from_spans(facts["processed"]),
         notes=facts["notes"],
         chain=dict(facts["chain"]),
         candidates=None if candidates is None else read_detections(candidates),
     )
+    answered = facts.get("answered")  # earlier versions did not store it
+    if answered is None:
+        return read
+    return read.with_hand_outs(columns[HANDED_OUT], read.processed if answered == "at once" else answered)
 
 
 def write_curve(path: Path, counts: RankedCounts, rules: Mapping[str, Any]) -> None:

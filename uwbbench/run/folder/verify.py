@@ -249,7 +249,12 @@ class _Verifier:
         late = times_us > entry.facts["deadline_us"]
         again = {"n": len(times_us), "p50_us": float(np.median(times_us)), "mean_us": float(times_us.mean())}
         again |= {"max_us": float(times_us.max()), "missed": int(late.sum()), "missed_share": float(late.mean())}
-        self._same(f"journal.jsonl, {_about(entry)}", [{key: entry.facts[key] for key in again}], [again])
+        stored = {key: entry.facts[key] for key in again}
+        if entry.facts.get("step") is not None:  # earlier versions timed the step alone
+            step_us = self.folder.step_times_us(entry.unit)
+            again |= {"step p50_us": float(np.median(step_us)), "step max_us": float(step_us.max())}
+            stored |= {f"step {key}": entry.facts["step"][key] for key in ("p50_us", "max_us")}
+        self._same(f"journal.jsonl, {_about(entry)}", [stored], [again])
         self._count("times summed up again")
 
     def _content(self, entry: Entry) -> str:

@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from uwbbench.results.pareto import Point
+from uwbbench.results.times import WORDS
 from uwbbench.show.charts.chart import HEIGHT, PLAIN_NUMBERS, Series, Spec, axis, chart, deadline, limits
 from uwbbench.show.text.numbers import between, number, probability
 from uwbbench.show.text.quantity import Quantity
@@ -54,8 +55,8 @@ def speed_against_error(title: str, points: Sequence[Point], names: Mapping[str,
         "axis": {"labelExpr": TIMES, "labelOverlap": "greedy", "labelSeparation": 8},
     }
     y = {"scale": {"domain": span, "zero": False, "nice": False}}
-    reference = points[0].speed.reference
-    across = axis("ratio", f"Time a frame, in times of {names.get(reference, reference)} (log)", **x)
+    reference, timed = points[0].speed.reference, WORDS[points[0].speed.timed]
+    across = axis("ratio", f"Time a frame {timed}, in times of {names.get(reference, reference)} (log)", **x)
     up = axis("value", quantity.axis, **y)
     series = Series(names, [row["detector"] for row in rows])
     marker = series.encoding()

@@ -19,7 +19,9 @@ TIME = (
 """Label of a time in microseconds."""
 
 
-def latency(title: str, times_us: Mapping[str, FloatArray], deadline_us: float, names: Mapping[str, str]) -> Spec:
+def latency(
+    title: str, times_us: Mapping[str, FloatArray], deadline_us: float, names: Mapping[str, str], timed: str
+) -> Spec:
     """Share of calls that take as long as a time or longer, one curve for each detector.
 
     Parameters
@@ -31,6 +33,8 @@ def latency(title: str, times_us: Mapping[str, FloatArray], deadline_us: float, 
         Frame period of the radar.
     names : mapping of str to str
         Labels of detectors.
+    timed : str
+        What the times are of, in words.
     """
     rows = []
     for detector, times in times_us.items():
@@ -83,5 +87,8 @@ def latency(title: str, times_us: Mapping[str, FloatArray], deadline_us: float, 
             "encoding": {"x": axis("time", "", **x), "y": y, **look, "tooltip": tooltip},
         },
     ]
-    subtitle = "This machine only. A call right of the dashed line misses the next frame. Marks: P50, P90 and P99."
+    subtitle = (
+        f"Times {timed}, this machine only. A call right of the dashed line misses the next frame. "
+        "Marks: P50, P90 and P99."
+    )
     return chart(title, subtitle, layers, data={"values": rows})

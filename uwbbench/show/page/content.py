@@ -17,6 +17,7 @@ from uwbbench.results.report import Report
 from uwbbench.results.results import Scored
 from uwbbench.results.set_aside import SetAside
 from uwbbench.results.slices import Board, Slice, cuts, range_edges_m, slices, span_name
+from uwbbench.results.times import in_words
 from uwbbench.show.charts import time_chart
 from uwbbench.show.charts.chart import Spec
 from uwbbench.show.looks import Look, looks
@@ -124,14 +125,14 @@ class Content:
         for dataset in self.datasets:
             times: dict[str, Any] = {}
             deadlines = []
-            for entry in self.report.entries:
-                if (entry.kind, entry.status, entry.dataset) == ("latency", "done", dataset):
-                    parts = [times[entry.detector]] if entry.detector in times else []
-                    times[entry.detector] = np.concatenate([*parts, self.report.folder.times_us(entry.unit)])
-                    deadlines.append(entry.facts["deadline_us"])
+            timed = self.report.measured(dataset)
+            for entry in timed:
+                parts = [times[entry.detector]] if entry.detector in times else []
+                times[entry.detector] = np.concatenate([*parts, self.report.folder.times_us(entry.unit)])
+                deadlines.append(entry.facts["deadline_us"])
             if times:
                 title = self.title("Times of calls", dataset, sources.get(dataset, "measured"))
-                yield time_chart.latency(title, times, min(deadlines), self.detectors)
+                yield time_chart.latency(title, times, min(deadlines), self.detectors, in_words(timed))
 
     @cached_property
     def cases(self) -> list[Case]:

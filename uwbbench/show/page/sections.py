@@ -56,9 +56,8 @@ def leaderboard(content: Content) -> Section | None:
     confidence = f"{content.report.experiment['intervals']['confidence']:.0%}"
     notes = (
         f"Value, and below it its {confidence} interval. {INTERVALS} Errors are those of all retained detections; "
-        "\u201cof "
-        "matches\u201d counts true positives only: read it with recall. n/a: undefined. Absolute times hold on one "
-        "machine only; the ratio travels.",
+        "\u201cof matches\u201d counts true positives only: read it with recall. n/a: undefined. Times of a frame are "
+        f"{content.report.timed}; absolute ones hold on one machine only, the ratio travels.",
     )
     return Section("leaderboard", "Leaderboard", layout="leaderboard", notes=notes)
 

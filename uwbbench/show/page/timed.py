@@ -23,11 +23,7 @@ def timed_cells(content: Content, dataset: str) -> dict[str, list[TimedCell]]:
     """One cell for each column, by detector; without detectors that were not timed on the dataset."""
     cells = {}
     for detector in content.report.detectors:
-        facts = [
-            entry.facts
-            for entry in content.report.entries
-            if (entry.kind, entry.status, entry.dataset, entry.detector) == ("latency", "done", dataset, detector)
-        ]
+        facts = [entry.facts for entry in content.report.measured(dataset, detector)]
         if facts:
             calls = f"n = {sum(one['n'] for one in facts)} calls"
             median = [_median(facts, "p50_us", calls), _median(facts, "p99_us", f"{calls}; needs 368")]

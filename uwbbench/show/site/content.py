@@ -12,6 +12,7 @@ from uwbbench.results.leaderboard.ranking import Ranking, Standing, rankings, re
 from uwbbench.results.leaderboard.runs import Run
 from uwbbench.results.leaderboard.suites import Contender, Suite
 from uwbbench.results.results import errors_in
+from uwbbench.results.times import WORDS as TIMED
 from uwbbench.results.verdicts import WITHIN, WORDS, listed
 from uwbbench.run.folder.identity import digest
 from uwbbench.show.html.cell import Cell, Table
@@ -249,7 +250,7 @@ class Content:
             ("scoring", f"{', '.join(rule.scoring for rule in rules)}; gate {100 * rules[0].gate_m:g} cm"),
             ("runs", ", ".join(shown(run.name) for run in suite.runs)),
             ("machines", "; ".join(sentence(machine) for machine in machines)),
-            ("reference of times", "none" if reference is None else shown(reference[0])),
+            ("reference of times", "none" if reference is None else f"{shown(reference[0])}, {TIMED[reference[2]]}"),
         ]
 
     def to_dict(self) -> dict[str, Any]:

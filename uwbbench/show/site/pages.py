@@ -11,6 +11,7 @@ from uwbbench.measure.accuracy.boards import EQUAL_CONFIDENCE, RANKED_UNITS, SIG
 from uwbbench.measure.accuracy.intervals import INNER_UNITS
 from uwbbench.results.leaderboard.ranking import SETTINGS, speeds_by_machine
 from uwbbench.results.leaderboard.suites import Contender, Suite
+from uwbbench.results.times import WORDS as TIMED
 from uwbbench.results.verdicts import INTERVALS, WORDS
 from uwbbench.show.html.cell import Cell, Table
 from uwbbench.show.html.render import badge
@@ -302,15 +303,21 @@ def _times(content: Content, mine: list[tuple[Suite, Contender]]) -> Table:
         for dataset in suite.datasets:
             for machine, speed in speeds_by_machine(suite, contender, dataset).items():
                 ratio = interval(speed.ratio, speed.low, speed.high, 3)
-                about = (sentence(machine), content.names.suite(suite), shown(dataset), shown(speed.reference))
+                about: tuple[str, ...] = (
+                    sentence(machine),
+                    content.names.suite(suite),
+                    shown(dataset),
+                    shown(speed.reference),
+                )
+                about += (TIMED[speed.timed],)
                 times = (
                     Cell(ratio, key=f"{speed.ratio:.6g}"),
                     Cell(number(speed.p50_us, 0)),
                     Cell(str(speed.captures)),
                 )
                 rows.append((*map(Cell, about), *times))
-    columns = ("machine", "suite", "dataset", "reference", "time ratio", "median of a frame (us)", "timed captures (n)")
-    return Table("On each machine", columns, tuple(rows))
+    columns = ("machine", "suite", "dataset", "reference", "times are", "time ratio", "median of a frame (us)")
+    return Table("On each machine", (*columns, "timed captures (n)"), tuple(rows))
 
 
 def _failures(mine: list[tuple[Suite, Contender]]) -> Table:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -10,6 +11,7 @@ from uwbbench.api.text import one_line
 from uwbbench.measure.accuracy.intervals import INNER_UNITS, failing_share
 from uwbbench.measure.accuracy.metrics.choice import MetricChoice
 from uwbbench.results.report import Report
+from uwbbench.results.times import ROWS
 from uwbbench.results.verdicts import WITHIN, rank_text
 from uwbbench.show.text.captures_sheets import captures_sheet, each_capture_sheet
 from uwbbench.show.text.error_sheets import cause_sheets, curve_sheets, main_causes
@@ -168,12 +170,13 @@ def _leaderboards(report: Report) -> Iterator[Sheet]:
         few = [one for one in report.set_aside if (one.dataset, one.source, one.scoring, "filtering") == board]
         seen = table == "mapping" and report.folder.rules[0].surface == "visible"
         faces = ["Errors are distances to the part of an outline that the receiver can see (surface: visible)."] * seen
-        notes = (*map(set_aside_warning, few), *faces, *_leaderboard_notes(members, quantities, report.metrics))
+        said = _leaderboard_notes(members, quantities, report.metrics, report.timed)
+        notes = (*map(set_aside_warning, few), *faces, *said)
         yield Sheet(title, ("detector", "rank", *heads, *extra), tuple(rows), notes)
 
 
 def _leaderboard_notes(
-    members: list[tuple[dict[str, Any], Any]], quantities: Mapping[str, Quantity], metrics: MetricChoice
+    members: list[tuple[dict[str, Any], Any]], quantities: Mapping[str, Quantity], metrics: MetricChoice, timed: str
 ) -> Iterator[str]:
     open_world = any(not about["exhaustive"] for about, _ in members)
     main = quantities[metrics.ranking(exhaustive=not open_world)]
@@ -193,7 +196,8 @@ def _leaderboard_notes(
                 f"{shown(about['detector'])}: {about['invalid']} frames invalid or not processed, "
                 f"{about['unprocessed']} of them with known truth"
             )
-    yield "Times hold on this machine only."
+    if any(not math.isnan(about["p50_us"]) for about, _ in members):
+        yield f"Times are {timed}, and hold on this machine only."
 
 
 def _evidence(members: list[tuple[dict[str, Any], Any]], main: Quantity) -> Iterator[str]:
@@ -245,28 +249,49 @@ def _stability(report: Report) -> Sheet:
 
 
 def _latency(report: Report) -> Sheet:
-    times = ("p50_us", "p90_us", "p95_us", "p99_us", "max_us", "clustering_p50_us", "amortised_us", "throughput_us")
-    heads = ("p50", "p90", "p95", "p99", "max", "clustering call", "amortised", "batch a frame")
     table = report.latency
     rows = []
     for row in table.to_dict("records"):
-        cells = [shown(row["detector"]), shown(row["capture"]), *(number(row[name], 1) for name in times)]
+        whole = row["timed"] == ROWS
+        cells = [shown(row["detector"]), shown(row["capture"])]
+        cells += [number(row[name], 1) if whole else UNKNOWN for name in _TIMES]
+        cells += [number(row[f"step_{name}"], 1) for name in _STEP_TIMES]
         cells += [interval(row["ratio"], row["ratio_low"], row["ratio_high"], 3), number(row["total_ratio"], 3)]
+        cells += [number(row[f"age_{name}"], digits, factor) for name, digits, factor in _AGES]
         cells += [number(row["missed_share"], 2, 100.0), number(row["missed_share_high"], 2, 100.0)]
         cells += [str(row["longest_burst"]), number(row["startup_s"], 2), number(row["peak_memory_bytes"], 0, 1e-6)]
         rows.append((*cells, number(row["overhead_us"], 1), str(row["n"])))
     references = ", ".join(sorted({name for name in table["reference"] if isinstance(name, str)})) or "none"
-    columns = ("detector", "capture", *(f"{head} (us)" for head in heads), "ratio to reference", "ratio of all time")
-    columns += ("missed (%)", "at most (%)", "longest burst", "start-up (s)", "memory (MB)", "harness (us)", "calls")
-    notes = (
-        "THIS MACHINE ONLY: times in us of single calls, one frame each, on one core with one thread.",
-        f"What travels is the ratio to a reference detector ({references}), measured in alternating blocks.",
+    columns = ("detector", "capture", *(f"{head} (us)" for head in _TIME_HEADS), "step p50 (us)", "step p99 (us)")
+    columns += ("ratio to reference", "ratio of all time", *_AGE_HEADS)
+    columns += ("missed (%)", "at most (%)", "longest burst", "start-up (s)", "memory (MB)", "uwbbench (us)", "calls")
+    notes: tuple[str, ...] = (
+        "THIS MACHINE ONLY: times in us of single calls, one frame each, on one core with one thread, from raw samples "
+        "in memory to rows as plain records. Step: the part of it that the detector's own step takes.",
+        f"What travels is the ratio to a reference detector ({references}), measured in alternating blocks, "
+        f"{report.timed}.",
         "Ratio of all time: of all blocks together, in which rare expensive calls count as much as they take.",
+        "Age: from the arrival of a frame to the call that hands out its detection, as seen by driving the detector "
+        "frame by frame; in frames, and in ms with the time of that call. At the end: share that only the flush gave.",
         "n/a: too few calls for that percentile (36, 72 and 368 for P90, P95 and P99), or the detector reports none.",
         "At most: upper end of the 95 % interval of the share of missed deadlines, for independent calls.",
-        "harness: the same loop with a detector that does nothing.",
+        "uwbbench: the same loop with a detector that does nothing.",
+    )
+    old = dict.fromkeys(shown(row["detector"]) for row in table.to_dict("records") if row["timed"] != ROWS)
+    notes += tuple(
+        f"{name}: measured by an earlier version, which timed the step alone, also for ratio, deadlines and harness"
+        for name in old
     )
     detector_notes = dict.fromkeys(
         f"{shown(row['detector'])}: {row['notes']}" for row in table.to_dict("records") if row["notes"]
     )
     return Sheet("Latency", columns, tuple(rows), (*notes, *detector_notes))
+
+
+_TIMES = ("p50_us", "p90_us", "p95_us", "p99_us", "max_us", "clustering_p50_us", "amortised_us", "throughput_us")
+_TIME_HEADS = ("p50", "p90", "p95", "p99", "max", "clustering call", "amortised", "batch a frame")
+_STEP_TIMES = ("p50_us", "p99_us")
+_AGES = (("p50_frames", 1, 1.0), ("p95_frames", 1, 1.0), ("p50_s", 2, 1e3), ("p95_s", 2, 1e3), ("end_share", 1, 100.0))
+_AGE_HEADS = ("age p50 (frames)", "age p95 (frames)", "age p50 (ms)", "age p95 (ms)", "at the end (%)")
+UNKNOWN = "not known"
+"""A time that an earlier version did not measure."""

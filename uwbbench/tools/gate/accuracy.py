@@ -60,7 +60,7 @@ def found_on(gate: Gate, worker: Worker, ref: CaptureRef, scene: str) -> Found:
     Parameters
     ----------
     gate : Gate
-        Its accuracy rules decide whether the peaks before the filters are wanted too.
+        Its accuracy rules decide whether the peaks before the filters, and the times of hand-out, are wanted too.
     worker : Worker
         In the environment of the head.
     ref : CaptureRef
@@ -72,11 +72,13 @@ def found_on(gate: Gate, worker: Worker, ref: CaptureRef, scene: str) -> Found:
     SetUpError
         If it cannot be run, or its environment reads another content.
     """
-    candidates = any(rule.scoring == "peak" for rule in gate.model.accuracy)
+    candidates, handed_out = (
+        any(rule.scoring == scoring for rule in gate.model.accuracy) for scoring in ("peak", "latest")
+    )
     capture = ref.open()
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "detections.parquet"
-        answer = detect(worker, gate.head, ref, candidates=candidates, to=path)
+        answer = detect(worker, gate.head, ref, candidates=candidates, handed_out=handed_out, to=path)
         before_filters = path.with_suffix(".candidates.parquet")
         detections = read_detections(path, before_filters if candidates else None)
     if answer["sha256"] != capture.sha256:

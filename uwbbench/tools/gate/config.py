@@ -36,7 +36,7 @@ class SideModel(ConfigModel):
 
 
 class LatencyGateModel(ConfigModel):
-    """How much slower than the base the head may be."""
+    """How much slower than the base the head may be, from raw samples to rows."""
 
     maximum_ratio: float = Field(default=1.05, gt=1, description="Largest time of the head, relative to the base.")
     captures: Captures = Field(default="first", description="Captures of each dataset that are timed.")
@@ -48,7 +48,7 @@ class LatencyGateModel(ConfigModel):
 
 
 class DeadlineModel(ConfigModel):
-    """How many frames may be answered later than the next one comes."""
+    """How many frames may be answered later than the next one comes, from raw samples to rows."""
 
     maximum_missed_share: float = Field(default=0.01, ge=0, lt=1, description="Largest share of missed deadlines.")
     maximum_burst: int | None = Field(default=None, ge=0, description="Most missed in a row; null: any.")

@@ -1,7 +1,8 @@
 """Relative latency: head against base on the same frames, in one job, by the rule of :mod:`uwbbench.tools.gate.rule`.
 
-Absolute times do not travel between machines, not even between two hours of one: nothing is compared with a stored
-time.
+Times are from raw samples to rows as plain records, on both sides: workers that time anything else speak another
+version of the protocol, and are refused. Absolute times do not travel between machines, not even between two hours of
+one: nothing is compared with a stored time.
 """
 
 from __future__ import annotations

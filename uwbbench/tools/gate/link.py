@@ -181,7 +181,9 @@ def join(worker: Worker, player: str, side: Side, ref: CaptureRef, frames: int, 
     )
 
 
-def detect(worker: Worker, side: Side, ref: CaptureRef, *, candidates: bool, to: Path) -> dict[str, Any]:
+def detect(
+    worker: Worker, side: Side, ref: CaptureRef, *, candidates: bool, handed_out: bool, to: Path
+) -> dict[str, Any]:
     """Run a side's detector on a whole capture in a worker; detections go into a file.
 
     Parameters
@@ -191,6 +193,8 @@ def detect(worker: Worker, side: Side, ref: CaptureRef, *, candidates: bool, to:
     ref : CaptureRef
     candidates : bool
         Whether to write the peaks before the filters too, next to the detections as ``*.candidates.parquet``.
+    handed_out : bool
+        Whether to find out after which frame each detection is handed out.
     to : Path
         Parquet file for the detections.
 
@@ -204,7 +208,8 @@ def detect(worker: Worker, side: Side, ref: CaptureRef, *, candidates: bool, to:
     SetUpError
         If the worker cannot load or run them.
     """
-    return worker.ask("detect", detector=_detector(side), capture=asdict(ref), candidates=candidates, to=str(to))
+    asked = {"candidates": candidates, "handed_out": handed_out, "to": str(to)}
+    return worker.ask("detect", detector=_detector(side), capture=asdict(ref), **asked)
 
 
 def _detector(side: Side) -> dict[str, Any]:

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from uwbbench.api.capture import Capture
     from uwbbench.measure.latency.player import Player
 
-PROTOCOL = 3
+PROTOCOL = 4
 """Raised whenever requests or answers change their meaning: only equal numbers understand each other."""
 
 
@@ -48,13 +48,14 @@ class Session:
         Returns
         -------
         dict
-            Median time of a call ``call_s``, number of ``frames``, hash of their ``content``, ``frame_rate_hz`` and
-            ``source``.
+            Median time of a call ``call_s``, from samples to rows, number of ``frames``, hash of their ``content``,
+            ``frame_rate_hz`` and ``source``.
         """
         from uwbbench.measure.latency.player import Player
+        from uwbbench.measure.latency.received import received
 
         opened = _opened(capture)
-        joined = Player(_loaded(detector), opened, opened.frames(0, frames))
+        joined = Player(_loaded(detector), opened, received(opened, frames))
         self._players[player] = joined
         joined.warm_up(windows)
         return {
@@ -112,7 +113,9 @@ class Session:
         """
         return {"responses_us": self._players[player].responses_us(count, rate_hz, paced=paced).tolist()}
 
-    def detect(self, detector: dict[str, Any], capture: dict[str, Any], candidates: bool, to: str) -> dict[str, Any]:
+    def detect(
+        self, detector: dict[str, Any], capture: dict[str, Any], candidates: bool, handed_out: bool, to: str
+    ) -> dict[str, Any]:
         """Run a detector on a whole capture; detections, and the peaks before its filters, go into files.
 
         Parameters
@@ -121,6 +124,8 @@ class Session:
             As in :meth:`join`.
         candidates : bool
             Whether to write the peaks before the filters too, next to the detections as ``*.candidates.parquet``.
+        handed_out : bool
+            Whether to find out after which frame each detection is handed out.
         to : str
             Parquet file for the detections.
 
@@ -132,7 +137,7 @@ class Session:
         from uwbbench.run.folder.tables import write_detections
 
         opened = _opened(capture)
-        detections = _loaded(detector).run(opened, candidates=candidates)
+        detections = _loaded(detector).run(opened, candidates=candidates, handed_out=handed_out)
         write_detections(Path(to), detections)
         if candidates and detections.candidates is not None:
             write_detections(Path(to).with_suffix(".candidates.parquet"), detections.candidates)

@@ -22,7 +22,7 @@ from uwbbench.config.detector import DetectorConfig, read_detector
 from uwbbench.config.extends import placed
 from uwbbench.config.given import Given, read_model
 from uwbbench.config.model import ConfigModel
-from uwbbench.config.rules import GateRadius, IntervalModel, RegionModel, Scoring, Table
+from uwbbench.config.rules import GateRadius, IntervalModel, RegionModel, Table
 from uwbbench.config.source import data_roots
 from uwbbench.detect.pipeline import Pipeline
 from uwbbench.measure.accuracy.scoring import Region, ScoringRules
@@ -116,7 +116,7 @@ class TuneModel(ConfigModel):
     groups: list[By] = Field(
         default=["material", "channel", "overall"], min_length=1, description="What is tuned separately."
     )
-    scoring: Scoring = Field(default="frame", description="How detections are counted.")
+    scoring: Literal["frame", "peak", "object"] = Field(default="frame", description="How detections are counted.")
     table: Table = Field(
         default="filtering", description="After which half of the chain; a grid is scored after filtering."
     )
