@@ -20,8 +20,7 @@ Conventions
 * ``object``: detections and visible obstacles are matched one-to-one (:mod:`uwbbench.measure.accuracy.matching`). Other
   detections are false, those within the gate of an already matched obstacle being counted apart too (``duplicates``),
   except those within the gate of structure (``structure``). The other scorings count walls as false, as the paper does.
-* ``latest``: as ``frame``, but the detections of a frame are the latest answer that the detector had given by then
-  (:mod:`uwbbench.measure.accuracy.age`): late answers of a robot that moves are wrong by how far it has moved.
+* ``latest``: as ``frame``, of the latest answer that had been given by then (:mod:`uwbbench.measure.accuracy.age`).
 * An error refers to the matched obstacle, else to the nearest visible one, else to the nearest labelled one.
 * Truth that is not exhaustive: a detection that matches nothing is ``unmatched``, neither true nor false, and has no
   error. Frames and obstacles that nothing matches are misses.
@@ -90,11 +89,6 @@ class ScoringRules:
             raise ScoringError(f"gate_m must be positive and finite, not {self.gate_m}")
         if self.strongest is not None and self.strongest < 1:
             raise ScoringError(f"strongest must be at least 1, not {self.strongest}")
-
-    @property
-    def one_a_frame(self) -> bool:
-        """Whether the strongest detection of a frame stands for it."""
-        return self.scoring in ("frame", "latest")
 
 
 @dataclass(frozen=True)
@@ -239,8 +233,7 @@ def judge(detections: Detections, scene: Scene, rules: ScoringRules, table: Tabl
     Raises
     ------
     ScoringError
-        If ``peak`` is asked for and the peaks before the filters are not known, or ``latest`` and it is not known when
-        the detections were handed out.
+        If ``peak`` is asked for without the peaks before the filters, or ``latest`` without the times of hand-out.
     """
     if rules.scoring == "latest":
         detections = latest_answers(detections)
@@ -322,7 +315,7 @@ def _strongest(detections: Detections, rules: ScoringRules) -> Detections:
     """Detections ordered by frame and falling amplitude, no more in a frame than the rules allow."""
     weakness = np.nan_to_num(-detections["amplitude"], nan=np.inf)
     detections = detections.take(np.lexsort((weakness, detections.frame)))
-    most = 1 if rules.one_a_frame else rules.strongest
+    most = 1 if rules.scoring in ("frame", "latest") else rules.strongest
     rank = np.arange(len(detections)) - np.searchsorted(detections.frame, detections.frame)
     return detections if most is None else detections.take(rank < most)
 
@@ -367,7 +360,7 @@ def _chance_recall(retained: IntArray, scene: Scene, rules: ScoringRules) -> flo
     start = np.where(visible, np.clip(range_m - rules.gate_m, low, high), high)
     stop = np.where(visible, np.clip(range_m + rules.gate_m, low, high), high)
     width = stop - start
-    if rules.one_a_frame:
+    if rules.scoring in ("frame", "latest"):
         order = np.argsort(start, axis=1)
         start, stop = np.take_along_axis(start, order, axis=1), np.take_along_axis(stop, order, axis=1)
         reached = np.maximum.accumulate(np.insert(stop[:, :-1], 0, low, axis=1), axis=1)
