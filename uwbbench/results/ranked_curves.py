@@ -24,7 +24,7 @@ from uwbbench.measure.accuracy import intervals
 from uwbbench.measure.accuracy.intervals import Interval
 from uwbbench.measure.accuracy.ranked import RankedCounts, pooled
 
-MOST_POINTS = 150
+MOST_POINTS = 100
 
 CurveKey = tuple[str, str, str]
 """Dataset, source and detector."""
