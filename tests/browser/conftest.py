@@ -85,11 +85,13 @@ class Browser:
         time.sleep(0.6)
 
     def column(self, head: str) -> list[str]:
-        """Texts of a column of the leaderboard, without the intervals."""
+        """Texts of a column of the leaderboard, without the marks and the intervals."""
         return self.run(
             "const t = document.getElementById('board');"
             "const i = [...t.tHead.rows[0].cells].findIndex(c => c.textContent === arguments[0]);"
-            "return [...t.tBodies[0].rows].map(r => r.cells[i].firstChild.textContent)",
+            "const plain = c => { const copy = c.cloneNode(true);"
+            "copy.querySelectorAll('small, svg').forEach(e => e.remove()); return copy.textContent; };"
+            "return [...t.tBodies[0].rows].map(r => plain(r.cells[i]))",
             head,
         )
 

@@ -17,6 +17,23 @@ def test_every_chart_is_drawn_and_named(opened) -> None:
     assert drawn == 3 + 2 + 8
 
 
+def test_a_table_wider_than_the_page_shows_that_it_goes_on_until_its_end(opened) -> None:
+    opened.width(390)
+    shaded = "return document.querySelector('#leaderboard .wide').classList.contains('more')"
+    assert opened.run(shaded)
+    opened.run("const s = document.querySelector('#leaderboard .scroll'); s.scrollLeft = s.scrollWidth")
+    opened.run("return new Promise(go => setTimeout(go, 300))")
+    assert not opened.run(shaded)
+    first = "return document.querySelector('#board tbody th').getBoundingClientRect().left"
+    assert 0 <= opened.run(first) < 40, "the first column stays"
+
+
+def test_the_map_names_the_detector_that_it_shows(opened) -> None:
+    label = "return document.querySelector('.look [data-chart=map] svg').getAttribute('aria-label')"
+    chosen = "return [...document.querySelectorAll('.look label.single select')].at(1).value"
+    assert opened.run(label).startswith(f"Places found by {opened.run(chosen)},")
+
+
 def test_simulated_captures_are_said_to_be_in_every_chart(opened) -> None:
     titles = opened.run("return [...document.querySelectorAll('.chart svg')].map(s => s.getAttribute('aria-label'))")
     assert titles

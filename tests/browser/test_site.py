@@ -80,9 +80,11 @@ def test_ink_follows_the_theme(index) -> None:
 
 
 def test_a_click_on_a_head_sorts_and_another_turns_it_around(index) -> None:
-    click = "[...document.querySelector('table').tHead.querySelectorAll('button')][arguments[0]].click()"
-    column = "return [...document.querySelector('table').tBodies[0].rows].map(r => r.cells[arguments[0]].dataset.key)"
-    heads = index.run("return [...document.querySelector('table').tHead.rows[0].cells].map(c => c.textContent)")
+    click = "[...document.querySelectorAll('table')[1].tHead.querySelectorAll('button')][arguments[0]].click()"
+    column = (
+        "return [...document.querySelectorAll('table')[1].tBodies[0].rows].map(r => r.cells[arguments[0]].dataset.key)"
+    )
+    heads = index.run("return [...document.querySelectorAll('table')[1].tHead.rows[0].cells].map(c => c.textContent)")
     place = heads.index("MAE (cm)")
     index.run(click, place)
     up = index.run(column, place)
@@ -93,6 +95,23 @@ def test_a_click_on_a_head_sorts_and_another_turns_it_around(index) -> None:
     assert known == sorted(known)
     assert [float(key) for key in down if key != "n/a"] == known[::-1]
     assert up[-1] == down[-1] == "n/a"
+
+
+def test_filters_narrow_the_table_of_all_detectors_and_datasets(index) -> None:
+    rows = "[...document.querySelectorAll('#part-1 tbody tr')].filter(r => !r.hidden)"
+    shown = f"return {rows}.map(r => r.cells[0].textContent)"
+    heads = "return [...document.querySelectorAll('#part-1 thead th')].filter(h => !h.hidden).length"
+    everything, columns = index.run(shown), index.run(heads)
+    write = "const i = document.querySelector(arguments[0]); i.value = arguments[1]; "
+    write += "i.dispatchEvent(new Event('input', { bubbles: true }))"
+    index.run(write, ".filters .rows", "CFAR")
+    assert index.run(shown) == ["cfar-os"]
+    index.run(write, ".filters .columns", "second")
+    assert index.run(heads) == 2 < columns
+    index.run(write, ".filters .rows", "")
+    index.run(write, ".filters .columns", "")
+    assert (index.run(shown), index.run(heads)) == (everything, columns)
+    assert index.run("return document.querySelector('a.download').href").endswith("/matrix.csv")
 
 
 def test_names_stay_text(chromium, site: Path) -> None:

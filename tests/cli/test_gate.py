@@ -16,7 +16,7 @@ from uwbbench.run.experiment import read_experiment
 ONCE = "{maximum_ratio: 3, frames: 100, blocks: 31, patience: 1, warmup_windows: 2, processes: 3}"
 """Latency with a limit that no machine reaches by chance."""
 
-PLATE = "{use: approach, name: plate, params: {speed_m_s: 1.0}}"
+PLATE = "{use: approach, name: plate}"
 """The gate's simulated capture."""
 
 

@@ -138,24 +138,29 @@ def print_leaderboard(report: Report) -> None:
     from uwbbench.show.text.report import Tables
     from uwbbench.show.text.wording import set_aside_warning
 
-    for sheet in Tables(report).published():
+    for sheet in (*Tables(report).published(), *Tables(report).limits()):
         print_table(sheet.title, sheet.columns, sheet.rows)
         for note in sheet.notes:
             typer.echo(f"  {note}")
         typer.echo()
-    quantities = Quantity.of_all(report.metrics.brief)
+    main = report.metrics.ranking(exhaustive=all(about["exhaustive"] for about, _ in report.estimates))
+    brief = Quantity.of_all(report.metrics.brief).items()
+    quantities = dict(sorted(brief, key=lambda item: item[0] != main))  # the one that ranks, and the time beside it
     groups: dict[str, list[list[str]]] = {}
     open_world: set[str] = set()
     for about, estimates in report.estimates:
+        if about["dataset"] in report.limits.datasets:  # test signals have the tables above, and no leader
+            continue
         title = f"{about['dataset']}, {about['source'].upper()}"
         if not about["exhaustive"]:
             open_world.add(title)
         numbers = [number(estimates[name].value, by.digits, by.factor) for name, by in quantities.items()]
-        others = [time_us(about, "p50_us"), number(about["chance_recall"], 3)]
+        numbers.insert(1, time_us(about, "p50_us"))
+        numbers.append(number(about["chance_recall"], 3))
         label = report.label(about["detector"])
-        groups.setdefault(title, []).append([about["scoring"], about["table"], label, *numbers, *others])
+        groups.setdefault(title, []).append([about["scoring"], about["table"], label, *numbers])
     heads = [by.axis for by in quantities.values()]
-    columns = ["scoring", "after", "detector", *heads, "p50 (us)", "chance recall"]
+    columns = ["scoring", "after", "detector", heads[0], "p50 (us)", *heads[1:], "chance recall"]
     for title, rows in groups.items():
         shown = slice(None) if title in open_world else slice(-1)
         print_table(title, columns[shown], [row[shown] for row in rows])

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 from uwbbench.measure.accuracy.judge import Scene, judge
 from uwbbench.measure.accuracy.metrics.detection import FalseAlarmsPerMinute, Precision
+from uwbbench.measure.accuracy.scoring import ScoringRules
 from uwbbench.measure.accuracy.stats import evaluate
 from uwbbench.results.results import Scored
 from uwbbench.run.folder.folder import RunFolder
@@ -65,7 +66,9 @@ def set_aside(folder: RunFolder, entries: Sequence[Entry], scored: Sequence[Scor
     scored : sequence of Scored
         What was scored of them.
     """
-    few = {rule.scoring: rule for rule in folder.rules if rule.scoring == "frame" or rule.strongest is not None}
+    few: dict[str, ScoringRules] = {
+        rule.scoring: rule for rule in folder.rules if rule.scoring == "frame" or rule.strongest is not None
+    }
     units = {(entry.detector, entry.dataset, entry.capture): entry for entry in entries}
     boards: dict[tuple[str, str, str, str], list[Scored]] = defaultdict(list)
     for one in scored:

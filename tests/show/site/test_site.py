@@ -1,5 +1,7 @@
 """The files of a site, and the folder that they are written into."""
 
+import csv
+import io
 import json
 import re
 import xml.etree.ElementTree as ET
@@ -11,14 +13,16 @@ from tests.fixtures.contributions import Make, content_of, elsewhere, failing
 from uwbbench.api import StoreError
 from uwbbench.api.locate import config_folder
 from uwbbench.api.yaml_file import read_yaml
+from uwbbench.results import Report
 from uwbbench.run.folder import RunFolder
+from uwbbench.show.page import Content as ReportContent
 from uwbbench.show.site import check_site, rendered, write_site
 from uwbbench.show.site.folder import MARKER
 from uwbbench.show.site.names import slug
 from uwbbench.show.site.pages import pages
 
 HOSTILE = "</script><img src=x onerror=alert(1)>\"'&`${1}\n../../etc\\x" + "x" * 10_000
-SAFE = re.compile(r"[a-z0-9-]+/[a-z0-9-]{1,60}\.html|(index|runs)\.html|leaderboard\.json|\.nojekyll")
+SAFE = re.compile(r"[a-z0-9-]+/[a-z0-9-]{1,60}\.html|(index|runs)\.html|leaderboard\.json|matrix\.csv|\.nojekyll")
 
 
 @pytest.fixture(scope="session")
@@ -54,19 +58,57 @@ def test_nothing_is_requested_from_elsewhere(site: dict[str, str]) -> None:
 
 def test_the_index_says_who_leads_and_who_is_as_good(alice: Path) -> None:
     index = next(page for page in pages(content_of(alice)) if page.address == "index.html")
-    (sentence,) = index.parts[0].sentences
+    (sentence,) = index.parts[1].sentences
     assert re.fullmatch(
         r"(twin|paper-filtering) has the highest F1, [\d.]+ \[[\d.]+, [\d.]+\] \(frame scoring\); practically equal to "
         r"it: (twin|paper-filtering); significantly different from it: null\.",
         sentence,
     )
     assert index.badge == "SIMULATED"
-    assert "SIMULATED" in index.parts[0].title
+    assert "SIMULATED" in index.parts[1].title
+
+
+def test_the_first_part_of_the_index_is_one_table_of_detectors_by_datasets(alice: Path, bob: Path) -> None:
+    content = content_of(alice, bob)
+    index = next(page for page in pages(content) if page.address == "index.html")
+    (table,) = index.parts[0].tables
+    assert len(table.columns) == 1 + len(content.sections)
+    assert [row[0].text for row in table.rows] == list(content.labels.values())
+    (section,) = content.sections
+    f1 = {one.contender.key: one.estimates["f1"].value for one in section.main.standings}
+    assert [float(row[1].text) for row in table.rows] == [round(f1[key], 3) for key in content.labels]
+
+
+def test_the_table_as_a_file_has_every_number_and_no_formula(make: Make) -> None:
+    run = make("formula", '[{use: paper-filtering, name: "=1+1"}, "null"]')
+    content = content_of(run)
+    rows = list(csv.reader(io.StringIO(rendered(content)["matrix.csv"])))
+    (section,) = content.sections
+    assert [row[0] for row in rows] == ["detector", "'=1+1", "null"]
+    assert all(len(row) == 2 + 4 * len(content.sections) for row in rows)
+    values = {one.contender.name: one.estimates["f1"].value for one in section.main.standings}
+    assert [float(row[2]) for row in rows[1:]] == pytest.approx([values["=1+1"], values["null"]], rel=1e-8)
+
+
+def test_a_detector_looks_the_same_in_every_table_and_as_in_the_report_of_its_run(alice: Path) -> None:
+    content = content_of(alice)
+    of_run = ReportContent(Report(RunFolder(alice))).marks
+    seen = {
+        (cell.text, cell.look)
+        for page in pages(content)
+        for part in page.parts
+        for table in part.tables
+        for row in table.rows
+        for cell in row
+        if cell.look is not None
+    }
+    assert seen == set(of_run.items())
+    assert len({look for _, look in seen}) == len(seen)
 
 
 def test_a_chart_is_well_formed_and_has_no_colours_of_paper(alice: Path) -> None:
     index = next(page for page in pages(content_of(alice)) if page.address == "index.html")
-    ((picture, words),) = index.parts[0].charts
+    ((picture, words),) = index.parts[1].charts
     ET.fromstring(picture)  # noqa: S314 - our own
     assert "var(--ink)" in picture
     assert "aria-" not in picture
@@ -117,7 +159,7 @@ def test_hostile_names_stay_names(make: Make, tmp_path: Path) -> None:
     assert all(SAFE.fullmatch(name) for name in files)
     assert sum(name.startswith("detectors/") for name in files) == 2
     for address, text in files.items():
-        assert address == "leaderboard.json" or "<img" not in text
+        assert address in ("leaderboard.json", "matrix.csv") or "<img" not in text
     write_site(tmp_path / "site", files)
     data = json.loads((tmp_path / "site" / "leaderboard.json").read_text())
     assert {one["detector"] for one in data["suites"][0]["boards"][0]["standings"]} == {HOSTILE, HOSTILE + "2"}

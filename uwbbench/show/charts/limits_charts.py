@@ -190,7 +190,7 @@ def _snr(rows: list[Spec]) -> Spec:
     return axis("snr", "Signal-to-noise ratio (dB)", scale=scale, axis={"values": values, "format": "~r"})
 
 
-def _share(row: Mapping[str, Any], names: Mapping[str, str], **place: float) -> Spec:
+def _share(row: Mapping[Any, Any], names: Mapping[str, str], **place: float) -> Spec:
     text = f"{number(row['share'], 3)} {between(row['low'], row['high'], 3)}, n = {row['n']}"
     where = ", ".join(f"{significant(value, 3)} {unit}" for unit, value in place.items() if unit == "ns")
     ends = {"low": row["low"], "high": row["high"]}

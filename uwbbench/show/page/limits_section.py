@@ -52,15 +52,15 @@ def _charts(content: Content) -> Iterator[Spec]:
 
 def _error(known: Limits, content: Content) -> Iterator[str]:
     """Nearest to the bound at the lowest and the highest SNR, among those that find nearly all echoes."""
-    table = known.accuracy
-    usual = table[(table["share"] >= USUAL) & (table["rmse_m"] > 0)]
-    if usual.empty:
+    usual = [row for row in known.accuracy.to_dict("records") if row["share"] >= USUAL and row["rmse_m"] > 0]
+    if not usual:
         yield f"At no signal-to-noise ratio does any detector find {USUAL:.0%} of single echoes."
         return
     said = []
-    for snr_db in sorted({usual["snr_db"].min(), usual["snr_db"].max()}):
-        at = usual[usual["snr_db"] == snr_db]
-        best = at.loc[at["rmse_m"].idxmin()]
+    ratios = [row["snr_db"] for row in usual]
+    for snr_db in sorted({min(ratios), max(ratios)}):
+        at = [row for row in usual if row["snr_db"] == snr_db]
+        best = min(at, key=lambda row: float(row["rmse_m"]))
         said.append(
             f"at {snr_db:g} dB {content.detectors[best['detector']]} has {number(best['rmse_m'], 2, 100)} cm RMS, "
             f"{times(best['ratio'])} the Cramer-Rao bound, the least of {len(at)}"
@@ -70,12 +70,11 @@ def _error(known: Limits, content: Content) -> Iterator[str]:
 
 def _rates(known: Limits, content: Content) -> Iterator[str]:
     """Measured against requested rate, of those that report every cell over their threshold."""
-    table = known.false_alarms
-    asked = table[(table["requested"] > 0) & table["condition"].str.startswith("all")]
     said = [
         f"{content.detectors[row['detector']]} {times(row['share'] / row['requested'])} "
         f"({row['condition'].removeprefix('all, ')} noise assumed)"
-        for row in asked.to_dict("records")
+        for row in known.false_alarms.to_dict("records")
+        if row["requested"] > 0 and row["condition"].startswith("all")
     ]
     if said:
         yield f"False alarms, measured in times of the requested rate a cell: {', '.join(said)}."
@@ -83,21 +82,14 @@ def _rates(known: Limits, content: Content) -> Iterator[str]:
 
 def _apart(known: Limits, content: Content) -> Iterator[str]:
     """Smallest distance at which any detector resolves most pairs."""
-    table = known.resolution
-    most = table[table["low"] > 0.5]
-    if most.empty:
-        best = table.loc[table["share"].idxmax()]
-        apart_cm = 100 * SPEED_OF_LIGHT_M_S * 1e-9 / 2 * best["separation_ns"]
-        yield (
-            f"Resolution: no detector resolves most pairs of equal echoes; {content.detectors[best['detector']]} comes "
-            f"nearest, with {best['share']:.0%} at {best['separation_ns']:g} ns ({apart_cm:.0f} cm)."
-        )
-        return
-    nearest = most["separation_ns"].min()
-    best = most[most["separation_ns"] == nearest]
-    who = best.loc[best["share"].idxmax()]
-    apart_cm = 100 * SPEED_OF_LIGHT_M_S * 1e-9 / 2 * nearest
-    yield (
-        f"Resolution: two equal echoes {nearest:g} ns ({apart_cm:.0f} cm) apart are the closest that any detector "
-        f"resolves in most cases, {content.detectors[who['detector']]} in {who['share']:.0%} of them."
-    )
+    rows = known.resolution.to_dict("records")
+    most = [row for row in rows if row["low"] > 0.5]
+    nearest = min((row["separation_ns"] for row in most), default=None)
+    best = max((row for row in most or rows if nearest in (None, row["separation_ns"])), key=lambda row: row["share"])
+    apart_cm = 100 * SPEED_OF_LIGHT_M_S * 1e-9 / 2 * best["separation_ns"]
+    where = f"{best['separation_ns']:g} ns ({apart_cm:.0f} cm)"
+    who = f"{content.detectors[best['detector']]}, {best['share']:.0%} of them"
+    if most:
+        yield f"Resolution: two equal echoes {where} apart are the closest that most pairs are resolved at: {who}."
+    else:
+        yield f"Resolution: no detector resolves most pairs of equal echoes; the most are resolved at {where}: {who}."

@@ -2,24 +2,24 @@
 
 from __future__ import annotations
 
-import math
-import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
-from uwbbench.measure.accuracy.stats import Estimate
-from uwbbench.results.leaderboard.ranking import Pair, Ranking, Standing, rankings, reference_of
+from uwbbench.results.leaderboard.ranking import Ranking, Standing, rankings, reference_of
 from uwbbench.results.leaderboard.runs import Run
-from uwbbench.results.leaderboard.suites import Suite
+from uwbbench.results.leaderboard.suites import Contender, Suite
 from uwbbench.results.results import errors_in
+from uwbbench.run.folder.identity import digest
 from uwbbench.show.html.cell import Cell, Table
+from uwbbench.show.looks import Look, looks
 from uwbbench.show.site import charts
+from uwbbench.show.site.cells import metric_cell, pair_cell, pair_text, quantity, speed_cell
 from uwbbench.show.site.error_pictures import error_pictures
 from uwbbench.show.site.names import Names
-from uwbbench.show.text.numbers import between, interval, number, p_value
-from uwbbench.show.text.quantity import Quantity, undefined_titles
+from uwbbench.show.text.numbers import p_value
+from uwbbench.show.text.quantity import undefined_titles
 from uwbbench.show.text.sheet import sentence, shown
 from uwbbench.show.text.wording import TABLES
 
@@ -90,6 +90,22 @@ class Content:
                 sections.append(Section(suite, dataset, source, shown(dataset), address, tuple(of_dataset)))
         return sections
 
+    @cached_property
+    def labels(self) -> dict[str, str]:
+        """Label of each contender by its key, in the order of their looks: as the runs list them, the oldest first."""
+        there = {one.key: self.names.detectors[one.key] for suite in self.suites for one in suite.contenders}
+        listed = [
+            digest([config["name"], run.manifest["detectors"].get(config["name"])])
+            for run in self.runs
+            for config in run.experiment["detectors"]
+        ]
+        return {key: there[key] for key in dict.fromkeys([*listed, *there]) if key in there}
+
+    @cached_property
+    def looks(self) -> dict[str, Look]:
+        """Look of each detector by its label."""
+        return looks(self.labels.values())
+
     def of_suite(self, suite: Suite) -> list[Section]:
         """Datasets of one suite."""
         return [section for section in self.sections if section.suite is suite]
@@ -100,14 +116,16 @@ class Content:
         """Leaderboard of one board, with all metrics or the headline ones."""
         _, _, scoring, table = ranking.board
         names = ranking.headline if headline else ranking.metrics.defined(exhaustive=ranking.exhaustive)
+        names = sorted(names, key=lambda name: name != ranking.main)  # the one that ranks stands first, then the time
         quantities = {name: quantity(ranking, name) for name in names}
         heads = [one.axis for one in quantities.values()]
         columns = (
             "detector",
             "rank",
-            *heads,
+            heads[0],
             "time ratio",
             "against the first",
+            *heads[1:],
             "captures",
             "frames (n)",
             "errors (n)",
@@ -116,9 +134,15 @@ class Content:
         rows = []
         for one in ranking.standings:
             rank = Cell("–", key="n/a") if one.rank is None else Cell(str(one.rank))
-            cells = [self.detector_cell(one), rank]
-            cells += [metric_cell(by, one.estimates[name]) for name, by in quantities.items()]
-            cells += [speed_cell(one), self._against(ranking, leader, one)]
+            first, *others = [metric_cell(by, one.estimates[name]) for name, by in quantities.items()]
+            cells = [
+                self.detector_cell(one),
+                rank,
+                first,
+                speed_cell(one),
+                self._against(ranking, leader, one),
+                *others,
+            ]
             cells.append(Cell(f"{len(one.scored)} of {ranking.captures}", key=str(len(one.scored))))
             frames = sum(len(part.outcome.group) for part in one.scored)
             errors = errors_in(part.outcome for part in one.scored)
@@ -128,9 +152,13 @@ class Content:
 
     def detector_cell(self, standing: Standing) -> Cell:
         """Name of a detector with a link to its page."""
-        key = standing.contender.key
-        title = f"{shown(standing.contender.name)}, identity {standing.contender.identity[:12]}"
-        return Cell(self.names.detectors[key], title=title, link=self.names.detector_page(standing.contender))
+        return self.cell_of(standing.contender)
+
+    def cell_of(self, contender: Contender) -> Cell:
+        """Name of a detector with its mark and a link to its page."""
+        label = self.labels[contender.key]
+        title = f"{shown(contender.name)}, identity {contender.identity[:12]}"
+        return Cell(label, title=title, link=self.names.detector_page(contender), look=self.looks[label])
 
     def _against(self, ranking: Ranking, leader: Standing, standing: Standing) -> Cell:
         if standing is leader:
@@ -187,21 +215,18 @@ class Content:
 
     def pareto(self, section: Section, metric: str) -> tuple[str, str] | None:
         """Chart of speed against a metric on the first board, with what it says in words."""
-        spec = charts.pareto(section.main, metric, section.title, self._labels(section.suite))
+        spec = charts.pareto(section.main, metric, section.title, self.labels)
         return None if spec is None else (charts.svg(spec), _described(spec))
 
     def errors(self, section: Section) -> tuple[str, str] | None:
         """Chart of the errors on the first board."""
-        spec = charts.errors(section.main, section.title, self._labels(section.suite))
+        spec = charts.errors(section.main, section.title, self.labels)
         return None if spec is None else (charts.svg(spec), _described(spec))
 
     def causes_and_curves(self, section: Section) -> tuple[tuple[str, str], ...]:
         """Charts of where errors come from, and of detectors without their thresholds."""
-        drawn = error_pictures(section.main, section.title, self._labels(section.suite))
+        drawn = error_pictures(section.main, section.title, self.labels)
         return tuple((charts.svg(spec), _described(spec)) for spec in drawn)
-
-    def _labels(self, suite: Suite) -> dict[str, str]:
-        return {one.key: self.names.detectors[one.key] for one in suite.contenders}
 
     def pairs(self, ranking: Ranking) -> Table:
         """All comparisons of a board."""
@@ -294,42 +319,6 @@ def _board_dict(ranking: Ranking) -> dict[str, Any]:
             for pair in ranking.pairs
         ],
     }
-
-
-def quantity(ranking: Ranking, name: str) -> Quantity:
-    """How a metric of a board is shown."""
-    return Quantity.of(name, ranking.metrics[name])
-
-
-def metric_cell(by: Quantity, estimate: Estimate) -> Cell:
-    """Value with its interval below."""
-    text = number(estimate.value, by.digits, by.factor)
-    ends = between(estimate.low, estimate.high, by.digits, by.factor)
-    return Cell(text, small=ends, key=_key(estimate.value), title=by.in_full(estimate))
-
-
-def speed_cell(standing: Standing) -> Cell:
-    """Time ratio with its interval below; absolute times hold on one machine only and are not shown here."""
-    speed = standing.speed
-    if speed is None:
-        return Cell("not timed", key="n/a")
-    return Cell(number(speed.ratio, 2), small=between(speed.low, speed.high, 2), key=_key(speed.ratio))
-
-
-def pair_text(ranking: Ranking, pair: Pair) -> str:
-    """Difference with unit and interval."""
-    by, d = quantity(ranking, pair.metric), pair.difference
-    text = f"{interval(d.value, d.low, d.high, by.digits, by.factor)} {by.unit}".strip()
-    return re.sub(r"-(0\.0*)(?!\d)", r"\1", text)  # what rounds to nothing has no sign
-
-
-def pair_cell(ranking: Ranking, pair: Pair) -> Cell:
-    """Difference of a pair."""
-    return Cell(pair_text(ranking, pair), key=_key(pair.difference.value))
-
-
-def _key(value: float) -> str:
-    return "n/a" if math.isnan(value) else f"{value:.6g}"
 
 
 def _described(spec: Mapping[str, Any]) -> str:

@@ -12,14 +12,9 @@ from uwbbench.results.leaderboard.ranking import SETTINGS, SIGNIFICANCE, speeds_
 from uwbbench.results.leaderboard.suites import Contender, Suite
 from uwbbench.show.html.cell import Cell, Table
 from uwbbench.show.html.render import badge
-from uwbbench.show.site.content import (
-    VERDICTS,
-    Content,
-    Section,
-    metric_cell,
-    pair_cell,
-    quantity,
-)
+from uwbbench.show.site.cells import metric_cell, pair_cell, quantity
+from uwbbench.show.site.content import VERDICTS, Content, Section
+from uwbbench.show.site.matrix import CSV, matrix
 from uwbbench.show.text.numbers import interval, number, p_value
 from uwbbench.show.text.sheet import sentence, shown
 from uwbbench.show.text.wording import TABLES
@@ -40,6 +35,8 @@ class Part:
     tables : tuple of Table
     folded : tuple of Table
         Tables that are opened on demand.
+    download : str
+        Address of the first table as a file; where there is one, the table has a filter.
     text : str
         Shown as it is, opened on demand.
     link : (str, str)
@@ -53,6 +50,7 @@ class Part:
     charts: tuple[tuple[str, str], ...] = ()
     tables: tuple[Table, ...] = ()
     folded: tuple[Table, ...] = ()
+    download: str = ""
     text: str = ""
     link: tuple[str, str] = ("", "")
 
@@ -110,6 +108,8 @@ def pages(content: Content) -> Iterator[Page]:
 
 def _index(content: Content) -> Page:
     parts = []
+    if content.sections:
+        parts.append(Part("All detectors on all datasets", tables=(matrix(content),), download=CSV))
     for suite in content.suites:
         sections = content.of_suite(suite)
         name = content.names.suite(suite)

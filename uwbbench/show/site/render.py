@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from uwbbench.run.folder.identity import plain
 from uwbbench.show.html.render import document
 from uwbbench.show.site.content import Content
+from uwbbench.show.site.matrix import CSV, matrix_csv
 from uwbbench.show.site.pages import pages
 
 DATA = "leaderboard.json"
@@ -30,4 +31,4 @@ def rendered(content: Content) -> Mapping[str, str]:
         for page in pages(content)
     }
     data = json.dumps(plain(content.to_dict()), indent=1, allow_nan=False)
-    return {**documents, DATA: f"{data}\n", NO_JEKYLL: ""}
+    return {**documents, DATA: f"{data}\n", CSV: matrix_csv(content), NO_JEKYLL: ""}

@@ -139,8 +139,18 @@ def _cell(value: Any) -> str:
         return ""
     if isinstance(value, float):
         return f"{value:.9g}"
-    text = str(value)
-    return f"'{text}" if text[:1] in "=+-@\t\r" and text else text
+    return csv_text(str(value))
+
+
+def csv_text(text: str) -> str:
+    """Text that no spreadsheet takes for a formula: an apostrophe goes before what could start one.
+
+    Examples
+    --------
+    >>> csv_text("=1+1"), csv_text("paper")
+    ("'=1+1", 'paper')
+    """
+    return f"'{text}" if text[:1] in ("=", "+", "-", "@", "\t", "\r") else text
 
 
 def latex(report: Report) -> str:
