@@ -180,8 +180,24 @@ def score(
         If the capture has no truth, the detections are of another capture or lack a range, ``peak`` is asked for and
         the peaks before the filters are not known, or a parameter is not allowed.
     """
-    rules = ScoringRules(scoring, gate_m, region or Region(), strongest)
-    scene = Scene.of(found, capture)
+    return score_scene(found, Scene.of(found, capture), ScoringRules(scoring, gate_m, region or Region(), strongest))
+
+
+def score_scene(found: Detections, scene: Scene, rules: ScoringRules) -> Scores:
+    """Score detections as :func:`score` does, where several scorings share what there is to be found.
+
+    Parameters
+    ----------
+    found : Detections
+    scene : Scene
+        Of these detections on their capture.
+    rules : ScoringRules
+
+    Raises
+    ------
+    ScoringError
+        As :func:`score`.
+    """
     verdicts = {table: judge(found, scene, rules, table) for table in tables_of(found)}
     blocks = {table: _block(found, scene, rules, table, verdict) for table, verdict in verdicts.items()}
     kept: dict[str, Outcome] = {table: verdict.outcome for table, verdict in verdicts.items()}
