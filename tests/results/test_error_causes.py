@@ -9,6 +9,7 @@ import pytest
 
 from uwbbench.results import Report
 from uwbbench.results.error_causes import ErrorCauses
+from uwbbench.results.report import EARLIER
 from uwbbench.run.folder import RunFolder
 from uwbbench.show.text.error_sheets import cause_sheets, main_causes
 from uwbbench.show.text.report import Tables
@@ -72,5 +73,6 @@ def test_a_run_of_an_older_version_has_no_causes_and_no_curves(small_run: RunFol
     pq.write_table(table.drop_columns("causes"), old / "scores.parquet")
     report = Report(RunFolder(old))
     assert report.causes == []
+    assert EARLIER in report.notes
     assert report.curves == {}
     assert list(Tables(report).causes()) == list(Tables(report).curves()) == []

@@ -34,6 +34,12 @@ def test_points_are_the_pooled_counts_at_their_thresholds(parts):
     assert float(curve.average_precision.value) == whole.average_precision
 
 
+def test_recall_at_few_false_alarms_is_that_of_all_thresholds(parts):
+    whole = pooled(parts)
+    allowed = np.cumsum(whole.fp) <= 10 * whole.duration_s / 60
+    assert ranked_curve(parts, 0.95).few_alarms_recall == np.cumsum(whole.tp)[allowed].max() / whole.there
+
+
 def test_intervals_are_those_of_shares_over_captures(parts):
     curve = ranked_curve(parts, 0.95)
     tp = [int(part.tp[part.score >= curve.score[-1]].sum()) for part in parts]

@@ -24,7 +24,10 @@ from uwbbench.measure.accuracy import intervals
 from uwbbench.measure.accuracy.intervals import Interval
 from uwbbench.measure.accuracy.ranked import RankedCounts, pooled
 
-MOST_POINTS = 150
+MOST_POINTS = 100
+
+FEW_ALARMS = 10.0
+"""False alarms a minute at which detectors are compared."""
 
 CurveKey = tuple[str, str, str]
 """Dataset, source and detector."""
@@ -44,6 +47,8 @@ class RankedCurve:
     score : (points,) array
         Thresholds, falling; the last may be minus infinity.
     recall, precision, false_alarms_per_minute : Interval of (points,) arrays
+    few_alarms_recall : float
+        Largest recall at no more than :data:`FEW_ALARMS` false alarms a minute; NaN where these are undefined.
     setting : mapping of str to Interval
         Recall, precision and false alarms a minute of the detector as it is set.
     exhaustive : bool
@@ -57,15 +62,9 @@ class RankedCurve:
     recall: Interval
     precision: Interval
     false_alarms_per_minute: Interval
+    few_alarms_recall: float
     setting: dict[str, Interval]
     exhaustive: bool
-
-    def recall_at(self, rate: float) -> float:
-        """Largest recall at no more than so many false alarms a minute; NaN where these are undefined."""
-        if not self.exhaustive:
-            return math.nan
-        reached = self.recall.value[self.false_alarms_per_minute.value <= rate]
-        return float(np.max(reached, initial=0.0))
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values; undefined ones are NaN."""
@@ -76,6 +75,7 @@ class RankedCurve:
             "scenes": self.scenes,
             "exhaustive": self.exhaustive,
             "score": self.score,
+            "few_alarms_recall": self.few_alarms_recall,
             **{name: _ends(getattr(self, name)) for name in names},
             "setting": {name: _ends(interval) for name, interval in self.setting.items()},
         }
@@ -129,6 +129,7 @@ def ranked_curve(
         average_precision=area,
         score=score,
         **_intervals(tp, fp, *about),
+        few_alarms_recall=_recall_at(whole, FEW_ALARMS),
         setting=_intervals(set_tp, set_fp, *about),
         exhaustive=whole.exhaustive,
     )
@@ -144,6 +145,11 @@ def _intervals(
     if not exhaustive:
         true, alarms = (Interval(*(np.full_like(end, math.nan) for end in one)) for one in (true, alarms))
     return {"recall": found, "precision": true, "false_alarms_per_minute": alarms}
+
+
+def _recall_at(whole: RankedCounts, rate: float) -> float:
+    reached = whole.recall[whole.false_alarms_per_minute <= rate]
+    return float(np.max(reached, initial=0.0)) if whole.exhaustive else math.nan
 
 
 def _reached(part: RankedCounts, name: str, score: FloatArray) -> IntArray:

@@ -46,6 +46,13 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
+EARLIER = (
+    "where errors come from is not known: an earlier version made these scores; 'uwbbench rescore' finds the kinds of "
+    "false detections, and only a new run the causes of misses, and curves without thresholds"
+)
+"""Said of a run whose scores hold no causes."""
+
+
 @contextmanager
 def read_safely(path: Path) -> Iterator[None]:
     """Turn what goes wrong over values that no run writes into one message about the folder.
@@ -352,7 +359,8 @@ class Report:
             for note in entry.facts["notes"]:
                 counts[f"{entry.detector}: {note}"] += 1
         said = [f"{note} ({count} captures)" if count > 1 else note for note, count in counts.items()]
-        return said + list(self.metrics.notes) + self.folder.damage
+        older = [EARLIER] if self.scored and not self.causes else []
+        return said + older + list(self.metrics.notes) + self.folder.damage
 
     def to_dict(self) -> dict[str, Any]:
         """Everything as plain values, for JSON; undefined numbers are NaN, which the store writes as null."""

@@ -211,4 +211,6 @@ def _kinds(verdict: Verdict, scene: Scene, rules: ScoringRules, table: Table) ->
 
 def _is_ghost(way_m: FloatArray, frame: IntArray, scene: Scene, rules: ScoringRules) -> BoolArray:
     """Whether excess paths (n,) are those of ghosts, within the gate in range."""
-    return np.asarray((np.abs(way_m[:, None] - ghosts_m(scene, frame)) <= 2 * rules.gate_m).any(axis=1))
+    frames, place = np.unique(frame, return_inverse=True)
+    off_m = np.abs(way_m[:, None] - ghosts_m(scene, frames)[place])
+    return np.asarray((off_m <= 2 * rules.gate_m).any(axis=1))

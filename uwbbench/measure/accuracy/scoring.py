@@ -186,7 +186,24 @@ def score(
         or a parameter is not allowed.
     """
     rules = ScoringRules(scoring, gate_m, region or Region(), strongest, surface)
-    scene = Scene.of(found, capture)
+    return score_scene(found, Scene.of(found, capture), rules)
+
+
+def score_scene(found: Detections, scene: Scene, rules: ScoringRules) -> Scores:
+    """Score detections as :func:`score` does, where several scorings share what there is to be found.
+
+    Parameters
+    ----------
+    found : Detections
+    scene : Scene
+        Of these detections on their capture.
+    rules : ScoringRules
+
+    Raises
+    ------
+    ScoringError
+        As :func:`score`.
+    """
     verdicts = {table: judge(found, scene, rules, table) for table in tables_of(found)}
     blocks = {table: _block(found, scene, rules, table, verdict) for table, verdict in verdicts.items()}
     kept: dict[str, Outcome] = {table: verdict.outcome for table, verdict in verdicts.items()}

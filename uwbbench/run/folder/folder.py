@@ -166,18 +166,24 @@ class RunFolder:
         candidates = self._file("candidates", unit)
         return tables.read_detections(self._file("detections", unit), candidates if candidates.is_file() else None)
 
-    def write_curve(self, unit: str, counts: RankedCounts, rules: ScoringRules) -> None:
-        """Store what a detector would find at every threshold of its score.
+    def write_curve(self, unit: str, counts: RankedCounts | None, rules: ScoringRules) -> None:
+        """Store what a detector would find at every threshold of its score, in place of what an earlier session stored.
 
         Parameters
         ----------
         unit : str
             Identifier of the unit.
-        counts : RankedCounts
+        counts : RankedCounts or None
+            None where they are not known.
         rules : ScoringRules
             Their gate and region gave the counts.
         """
-        tables.write_curve(self._file("curves", unit), counts, curve_rules(rules))
+        path = self._file("curves", unit)
+        if counts is None:
+            with disk_errors(path, "removed"):
+                path.unlink(missing_ok=True)
+        else:
+            tables.write_curve(path, counts, curve_rules(rules))
 
     def curve(self, unit: str, rules: ScoringRules) -> RankedCounts | None:
         """What a detector would find at every threshold; None where that is not known for this gate and region."""

@@ -16,7 +16,7 @@ from uwbbench.config.rules import RegionModel
 from uwbbench.measure.accuracy.causes import Causes, causes
 from uwbbench.measure.accuracy.judge import Scene
 from uwbbench.measure.accuracy.metrics.choice import MetricChoice, Metrics, names_of
-from uwbbench.measure.accuracy.scoring import Region, ScoringRules, outcomes, score
+from uwbbench.measure.accuracy.scoring import Region, ScoringRules, outcomes, score_scene
 from uwbbench.measure.accuracy.stats import evaluate
 from uwbbench.run.folder.folder import RunFolder
 from uwbbench.run.folder.identity import canonical
@@ -54,10 +54,12 @@ def score_rows(detections: Detections, header: CaptureHeader, rules: Iterable[Sc
         :class:`~uwbbench.measure.accuracy.scoring.ScoreBlock` too.
     """
     rows: list[dict[str, Any]] = []
+    scene: Scene | None = None
     for rule in rules:
         about = {"scoring": rule.scoring, "table": "filtering"}
         try:
-            scores = score(detections, header, rule.scoring, rule.gate_m, rule.region, rule.strongest, rule.surface)
+            scene = scene or Scene.of(detections, header)
+            scores = score_scene(detections, scene, rule)
         except ScoringError as error:
             rows.append({**about, "status": "unscored", "reason": str(error)})
             continue

@@ -11,6 +11,9 @@ from uwbbench.show.charts.chart import PLAIN_NUMBERS, Series, Spec, axis, chart
 from uwbbench.show.text.numbers import number, rounded
 
 ROW_PX = 34
+AROUND_PX, LEGEND_ROW_PX = 130, 20
+"""Title and axis, and a row of the legend: a chart has its height in all."""
+
 LEGEND_COLUMNS = 3
 """The plot is narrow beside the names of the causes, and so is its legend."""
 
@@ -62,4 +65,8 @@ def causes_of_errors(title: str, causes: Sequence[ErrorCauses], names: Mapping[s
         "encoding": {"x": x, "y": y, "yOffset": beside, **look, "tooltip": tooltip},
     }
     subtitle = "Each cause taken away alone: misses found, false detections gone. Gains do not add up."
-    return chart(title, subtitle, [points], data={"values": rows}, height=max(140, ROW_PX * len(order)))
+    return chart(title, subtitle, [points], data={"values": rows}, height=_height(len(order), len(series.detectors)))
+
+
+def _height(causes: int, detectors: int) -> int:
+    return AROUND_PX + LEGEND_ROW_PX * math.ceil(detectors / LEGEND_COLUMNS) + ROW_PX * causes

@@ -10,13 +10,18 @@ import numpy as np
 from uwbbench.measure.accuracy.intervals import INNER_UNITS, Interval
 from uwbbench.results.ranked_curves import RankedCurve
 from uwbbench.show.charts.chart import PLAIN_NUMBERS, Series, Spec, axis, chart
-from uwbbench.show.text.numbers import interval, number, rounded, significant
+from uwbbench.show.text.numbers import interval, rounded, significant
 
 SHARE: Spec = {"scale": {"domain": [0, 1], "nice": False}, "axis": {"format": PLAIN_NUMBERS, "tickCount": 6}}
 
 SUBTITLE = (
     "A line: every threshold of the score. A mark: the detector as it is set; bars: intervals, from 12 scenes on."
 )
+
+PLACES: list[Spec] = [
+    {"field": "x", "format": ".4~g", "title": "Across"},
+    {"field": "y", "format": ".4~g", "title": "Up"},
+]
 
 
 def precision_against_recall(title: str, curves: Mapping[str, RankedCurve], names: Mapping[str, str]) -> Spec | None:
@@ -81,13 +86,12 @@ def recall_against_false_alarms(title: str, curves: Mapping[str, RankedCurve], n
 
 
 def _steps(curve: RankedCurve, across: Interval, up: Interval) -> list[tuple[float, float, str]]:
-    """Points of a curve that have both values, with the threshold and the interval of recall in words."""
+    """Points of a curve that have both values, with the threshold in words."""
     said = []
-    columns = (curve.score, across.value, up.value, curve.recall.low, curve.recall.high, curve.recall.value)
-    for score, x, y, low, high, recall in zip(*(values.tolist() for values in columns), strict=True):
+    for score, x, y in zip(*(values.tolist() for values in (curve.score, across.value, up.value)), strict=True):
         if not (math.isnan(x) or math.isnan(y)):
-            threshold = f"{curve.order} of {number(score, 2)} or more" if math.isfinite(score) else "all candidates"
-            said.append((rounded(x) or 0.0, rounded(y) or 0.0, f"{threshold}: recall {interval(recall, low, high, 3)}"))
+            threshold = f"{score:.4g}" if math.isfinite(score) else "none"
+            said.append((rounded(x) or 0.0, rounded(y) or 0.0, threshold))
     return said
 
 
@@ -134,7 +138,7 @@ def _layers(series: Series, x: Spec, y: Spec, points: list[Spec]) -> list[Spec]:
                 "y": y,
                 "order": {"field": "order"},
                 "color": look["color"],
-                "tooltip": [names, {"field": "text", "title": "Threshold"}],
+                "tooltip": [names, {"field": "text", "title": "Threshold"}, *PLACES],
             },
         },
         *bars,

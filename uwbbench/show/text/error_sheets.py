@@ -10,16 +10,13 @@ import numpy as np
 
 from uwbbench.measure.accuracy.intervals import INNER_UNITS, Interval
 from uwbbench.results.error_causes import ErrorCauses
-from uwbbench.results.ranked_curves import CurveKey, RankedCurve
+from uwbbench.results.ranked_curves import FEW_ALARMS, CurveKey, RankedCurve
 from uwbbench.show.text.numbers import interval, number, significant
 from uwbbench.show.text.sheet import Sheet, shown
 from uwbbench.show.text.wording import TABLES
 
 MOST_CAUSES = 4
 """Causes of each detector that have a row; the others share one."""
-
-FEW_ALARMS = 10.0
-"""False alarms a minute at which detectors are compared."""
 
 
 def main_causes(causes: Sequence[ErrorCauses]) -> list[ErrorCauses]:
@@ -104,7 +101,7 @@ def curve_sheets(curves: Mapping[CurveKey, RankedCurve]) -> Iterator[Sheet]:
                 (
                     shown(detector),
                     _text(curve.average_precision),
-                    number(curve.recall_at(FEW_ALARMS), 3),
+                    number(curve.few_alarms_recall, 3),
                     _text(setting["recall"]),
                     _text(setting["precision"]),
                     significant(float(setting["false_alarms_per_minute"].value), 3),

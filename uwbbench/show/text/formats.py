@@ -93,6 +93,8 @@ def _csv_tables(report: Report) -> dict[str, list[dict[str, Any]]]:
     keys = ("kind", "detector", "dataset", "capture", "reason")
     return {
         "leaderboard": leaderboard,
+        "causes": _cause_rows(report),
+        "curves": _curve_rows(report),
         "paper_tables": report.paper_tables.to_dict("records"),  # type: ignore[dict-item]
         "latency": report.latency.drop(columns=["notes"], errors="ignore").to_dict("records"),  # type: ignore[dict-item]
         "captures": report.captures,
@@ -102,6 +104,28 @@ def _csv_tables(report: Report) -> dict[str, list[dict[str, Any]]]:
             {**facts_of(entry), "scoring": scoring, "reason": reason} for entry, scoring, reason in report.unscored
         ],
     }
+
+
+def _cause_rows(report: Report) -> list[dict[str, Any]]:
+    """One row for each cause of each detector on each board."""
+    rows = []
+    for one in report.causes:
+        about = {key: value for key, value in one.to_dict().items() if key not in ("causes", "set_aside")}
+        rows += [{**about, **vars(cost), "f1": one.f1, "f1_without": cost.f1} for cost in one.costs]
+    return rows
+
+
+def _curve_rows(report: Report) -> list[dict[str, Any]]:
+    """One row for each detector on each dataset; its whole curve is in the JSON."""
+    rows = []
+    for (dataset, source, detector), curve in report.curves.items():
+        row: dict[str, Any] = {"dataset": dataset, "source": source, "detector": detector, "order": curve.order}
+        intervals = {"average_precision": curve.average_precision}
+        intervals |= {f"{name}_as_set": one for name, one in curve.setting.items()}
+        for name, one in intervals.items():
+            row |= {name: float(one.value), f"{name}_low": float(one.low), f"{name}_high": float(one.high)}
+        rows.append({**row, "captures": curve.captures, "scenes": curve.scenes})
+    return rows
 
 
 def _csv(rows: Sequence[Mapping[str, Any]]) -> str:
