@@ -312,6 +312,10 @@ def jackknife(value: FloatArray, left: FloatArray, weights: FloatArray) -> Sprea
     """Standard error of a number (...) from its values without one unit at a time (..., units).
 
     Deviations are taken from the number itself; units that weigh nothing do not count.
+
+    Parameters
+    ----------
+    value, left, weights : (...), (..., units) and (..., units) array
     """
     units = np.count_nonzero(weights, axis=-1)
     off = np.where(weights > 0, left - value[..., None], 0.0)
@@ -336,7 +340,13 @@ def stratified(left: FloatArray, blocks: Blocks) -> Spread:
 
 
 def exact(value: FloatArray, trials: FloatArray, confidence: float = CONFIDENCE) -> tuple[FloatArray, FloatArray]:
-    """Ends of Clopper and Pearson's interval for a share (...) of a number of trials, which need not be whole."""
+    """Ends of Clopper and Pearson's interval for a share of a number of trials, which need not be whole.
+
+    Parameters
+    ----------
+    value, trials : (...) array
+    confidence : float
+    """
     from scipy.special import betaincinv
 
     tail = (1 - confidence) / 2
