@@ -50,7 +50,16 @@ class Evidence:
 
     @classmethod
     def of(cls, metric: type[Metric], series: Sequence[Sequence[Outcome]], scenes: Sequence[Hashable] = ()) -> Evidence:
-        """Evidence of some outcomes, for each detector one for each capture."""
+        """Evidence of some outcomes.
+
+        Parameters
+        ----------
+        metric : type of Metric
+        series : sequence of sequences of Outcome
+            One for each detector, and in it one for each capture, the captures in the same order.
+        scenes : sequence
+            What each capture is of; empty: each is of a scene of its own.
+        """
         captures = list(zip(*series, strict=True))
         names: Sequence[Hashable] = scenes or range(len(captures))
         members: dict[Hashable, list[int]] = {}
@@ -72,7 +81,19 @@ class Evidence:
 def interval_of(
     metric: type[Metric], parts: Sequence[FloatArray], value: float, confidence: float, within: Blocks | None = None
 ) -> Interval:
-    """Interval of a metric from the partials of units, by what kind of number it is."""
+    """Interval of a metric, by what kind of number it is.
+
+    Parameters
+    ----------
+    metric : type of Metric
+    parts : sequence of array
+        Partial of each unit.
+    value : float
+        Of all of them merged.
+    confidence : float
+    within : Blocks, optional
+        What the units are blocks of; left out: they are scenes.
+    """
     if math.isnan(value):
         return Interval(*np.full(5, np.nan))
     if metric.kind == "quantile":
@@ -93,7 +114,16 @@ def interval_of(
 
 
 def left_out(metric: type[Metric], parts: Sequence[FloatArray], within: Blocks | None) -> tuple[FloatArray, FloatArray]:
-    """Value (units,) without each unit, and what each unit weighs; of a metric without a form of its own, by parts."""
+    """Value (units,) without each unit, and what each unit weighs; of a metric without a form of its own, by parts.
+
+    Parameters
+    ----------
+    metric : type of Metric
+    parts : sequence of array
+        Partial of each unit.
+    within : Blocks or None
+        What the units are blocks of; None: they are scenes.
+    """
     if metric.kind in ("share", "ratio", "mean") and parts:
         num, den = np.array([metric.parts(part) for part in parts]).T
         return intervals.delete_one(num, den), den

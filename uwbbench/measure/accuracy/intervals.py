@@ -141,13 +141,8 @@ def ratio(
     most : array
         Largest value that a unit can have: of a mean error, the largest error that was seen. NaN: no bound is known;
         the inner interval is then that of the logarithm, and there is no outer one.
-    confidence : float
-    blocks : Blocks, optional
+    confidence, blocks
         As in :func:`share`.
-
-    Returns
-    -------
-    Interval
     """
     n, d, bound = np.asarray(num, float), np.asarray(den, float), np.asarray(most, float)
     if np.isnan(bound).all():
@@ -175,13 +170,8 @@ def mean(
         Sum and number of the values of each unit.
     most : array
         Largest magnitude of these values.
-    confidence : float
-    blocks : Blocks, optional
+    confidence, blocks
         As in :func:`share`.
-
-    Returns
-    -------
-    Interval
     """
     n, d, bound = np.asarray(num, float), np.asarray(den, float), np.asarray(most, float)
     scale = np.where(bound > 0, bound, 1.0)
@@ -253,13 +243,8 @@ def of_left_out(
         Units that there are.
     scale : {"logit", "log", "plain"}
         On which the interval is symmetric.
-    confidence : float
-    blocks : Blocks, optional
+    confidence, blocks
         As in :func:`share`.
-
-    Returns
-    -------
-    Interval
     """
     centre = np.asarray(value, float)
     middle = _scaled(centre, scale)
@@ -327,6 +312,10 @@ def jackknife(value: FloatArray, left: FloatArray, weights: FloatArray) -> Sprea
     """Standard error of a number (...) from its values without one unit at a time (..., units).
 
     Deviations are taken from the number itself; units that weigh nothing do not count.
+
+    Parameters
+    ----------
+    value, left, weights : (...), (..., units) and (..., units) array
     """
     units = np.count_nonzero(weights, axis=-1)
     off = np.where(weights > 0, left - value[..., None], 0.0)
@@ -351,7 +340,13 @@ def stratified(left: FloatArray, blocks: Blocks) -> Spread:
 
 
 def exact(value: FloatArray, trials: FloatArray, confidence: float = CONFIDENCE) -> tuple[FloatArray, FloatArray]:
-    """Ends of Clopper and Pearson's interval for a share (...) of a number of trials, which need not be whole."""
+    """Ends of Clopper and Pearson's interval for a share of a number of trials, which need not be whole.
+
+    Parameters
+    ----------
+    value, trials : (...) array
+    confidence : float
+    """
     from scipy.special import betaincinv
 
     tail = (1 - confidence) / 2

@@ -383,7 +383,15 @@ def samples_needed(quantile: float, confidence: float = 0.95) -> int:
 
 
 def samples_behind(metric: type[Metric], outcomes: Sequence[Outcome], value: float) -> int:
-    """Samples behind a value: those that a metric stacks; scored frames of one that counts, none if it is undefined."""
+    """Samples behind a value: those that a metric stacks; scored frames of one that counts, none if it is undefined.
+
+    Parameters
+    ----------
+    metric : type of Metric
+    outcomes : sequence of Outcome
+    value : float
+        Of all outcomes together.
+    """
     if metric.merge == "stack":
         return sum(len(metric.partial(outcome)) for outcome in outcomes)
     return 0 if math.isnan(value) else sum(len(outcome.group) for outcome in outcomes)

@@ -103,7 +103,14 @@ class Ranking:
         return self.metrics.headline(exhaustive=self.exhaustive)
 
     def pair(self, first: str, second: str, metric: str) -> Pair | None:
-        """As :meth:`uwbbench.results.verdicts.Ranks.pair`."""
+        """Comparison of two contenders, first minus second; None where they were not compared.
+
+        Parameters
+        ----------
+        first, second : str
+            Keys of contenders.
+        metric : str
+        """
         return self.ranks.pair(first, second, metric)
 
 
