@@ -14,7 +14,7 @@ def test_it_opens_offline_without_a_word_on_the_console_and_asks_nothing_of_the_
 def test_every_chart_is_drawn_and_named(opened) -> None:
     drawn = opened.run("return document.querySelectorAll('.chart svg[aria-label]').length")
     assert drawn == opened.run("return document.querySelectorAll('.chart').length")
-    assert drawn == 3 + 2 + 8
+    assert drawn == 3 + 2 + 2 + 4 + 8, "of the board, times, causes, curves, and captures"
 
 
 def test_a_table_wider_than_the_page_shows_that_it_goes_on_until_its_end(opened) -> None:
@@ -68,9 +68,12 @@ def test_a_click_on_a_head_sorts_and_another_turns_it_around(opened) -> None:
 
 
 def test_tables_of_texts_sort_too(opened) -> None:
-    names = "return [...document.querySelectorAll('#compared tbody tr')].map(r => r.cells[1].textContent)"
-    opened.run("document.querySelectorAll('#compared thead button')[1].click()")
+    names = "return [...document.querySelector('#compared tbody').rows].map(r => r.cells[0].textContent)"
+    button = "document.querySelector('#compared thead button').click()"
+    opened.run(button)
     assert opened.run(names) == sorted(opened.run(names))
+    opened.run(button)
+    assert opened.run(names) == sorted(opened.run(names), reverse=True)
 
 
 def test_filters_narrow_the_leaderboard(opened) -> None:
