@@ -36,7 +36,7 @@ from uwbbench.results.ranked_curves import CurveKey, RankedCurve, ranked_curve
 from uwbbench.results.results import Scored, errors_in, estimates_of, scenes_of, scored
 from uwbbench.results.set_aside import SetAside, set_aside
 from uwbbench.results.slices import Board
-from uwbbench.results.times import age_columns, comparable, in_words, step_columns, timed_of
+from uwbbench.results.times import comparable, in_words, row_of, timed_of
 from uwbbench.results.verdicts import Ranks, ranks_of
 from uwbbench.run.folder.folder import RunFolder
 from uwbbench.run.folder.journal import Entry
@@ -284,27 +284,7 @@ class Report:
         """One row for each detector and capture that was timed."""
         import pandas as pd
 
-        rows = []
-        for entry in self._of_kind("latency"):
-            facts = dict(entry.facts)
-            ratio, clustering = facts.pop("ratio_to_reference") or {}, facts.pop("clustering") or {}
-            columns = {"timed": timed_of(facts), **step_columns(facts), **age_columns(facts)}
-            for name in (
-                "plain",
-                "paced",
-                "quality",
-                "machine",
-                "step",
-                "age",
-            ):  # only in the JSON; older runs have none
-                facts.pop(name, None)
-            facts["notes"] = "; ".join(facts["notes"])
-            about = {"detector": entry.detector, "dataset": entry.dataset, "capture": entry.capture}
-            extra = {"ratio_low": ratio.get("low"), "ratio_high": ratio.get("high"), "ratio": ratio.get("ratio")}
-            extra |= {"reference": ratio.get("reference"), "clustering_p50_us": clustering.get("p50_us")}
-            extra |= {"total_ratio": ratio.get("total_ratio"), "missed_share_high": facts.get("missed_share_high")}
-            rows.append({**about, **facts, **columns, **extra})
-        return pd.DataFrame(rows)
+        return pd.DataFrame([row_of(entry) for entry in self._of_kind("latency")])
 
     @property
     def timed(self) -> str:

@@ -50,3 +50,18 @@ def age_columns(facts: Mapping[str, Any]) -> dict[str, Any]:
     """Ages of the answers as columns ``age_p50_frames`` and so on; None where they are not known."""
     age = facts.get("age") or {}
     return {f"age_{name}": age.get(name) for name in _AGES}
+
+
+def row_of(entry: Entry) -> dict[str, Any]:
+    """One stored measurement as a row of a table; what has no place in one, the JSON has."""
+    facts = dict(entry.facts)
+    ratio, clustering = facts.pop("ratio_to_reference") or {}, facts.pop("clustering") or {}
+    columns = {"timed": timed_of(facts), **step_columns(facts), **age_columns(facts)}
+    for name in ("plain", "paced", "quality", "machine", "step", "age"):  # older runs have none
+        facts.pop(name, None)
+    facts["notes"] = "; ".join(facts["notes"])
+    about = {"detector": entry.detector, "dataset": entry.dataset, "capture": entry.capture}
+    extra = {"ratio_low": ratio.get("low"), "ratio_high": ratio.get("high"), "ratio": ratio.get("ratio")}
+    extra |= {"reference": ratio.get("reference"), "clustering_p50_us": clustering.get("p50_us")}
+    extra |= {"total_ratio": ratio.get("total_ratio"), "missed_share_high": facts.get("missed_share_high")}
+    return {**about, **facts, **columns, **extra}
