@@ -79,6 +79,10 @@ class Approach(Dataset[ApproachParams]):
         p = self.params
         return [f"approach-ch{p.channel}-{p.material}-{run}" for run in range(1, p.runs + 1)]
 
+    def scene(self, name: str) -> str:
+        """All runs are of one scene: only noise and ringing differ."""
+        return name.rpartition("-")[0]
+
     def open(self, name: str) -> Capture:
         """Simulate one run."""
         names = self.names()

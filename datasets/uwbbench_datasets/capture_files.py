@@ -110,6 +110,10 @@ class CaptureFiles(Dataset[CaptureFilesParams]):
             names += [f"{stem}/{name}" for name in wanted] if len(receivers) > 1 and wanted else [stem]
         return names
 
+    def scene(self, name: str) -> str:
+        """The file: what several receivers on one robot saw together is one recording."""
+        return name if name in self._files else name.rpartition("/")[0]
+
     def open(self, name: str) -> Capture:
         """Open one receiver of one file.
 

@@ -13,6 +13,7 @@ from uwbbench.api.geometry import (
     excess_path,
     inside,
     nearest_on_outline,
+    nearest_on_visible,
     receiver_pose,
     rotate_z,
     segments_cross,
@@ -129,6 +130,60 @@ def test_the_nearest_point_of_an_outline_is_that_of_densely_sampled_edges(case):
     found = np.linalg.norm(nearest_on_outline(point[None], outline)[0] - point)
     assert found <= sampled + 1e-12
     assert found == pytest.approx(sampled, abs=4e-3)
+
+
+def star(corners, rng):
+    """Outline (corners, 2) whose edges do not cross, with dents, around the origin."""
+    angle = 2 * np.pi * (np.arange(corners) + rng.uniform(0.1, 0.9, corners)) / corners
+    return rng.uniform(0.3, 1.5, corners)[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+
+
+def seen_samples(outline, eye, steps=1200):
+    """Samples of the edges to which the straight way from an eye meets no other edge, one by one."""
+    seen = []
+    edges = list(zip(outline, np.roll(outline, -1, axis=0), strict=True))
+    for number, (a, b) in enumerate(edges):
+        samples = a + np.linspace(0, 1, steps)[:, None] * (b - a)
+        others = [edge for other, edge in enumerate(edges) if other != number]
+        hidden = np.zeros(steps, bool)
+        for c, d in others:
+            matrix = np.stack([samples - eye, np.broadcast_to(c - d, samples.shape)], axis=-1)
+            share = np.linalg.solve(matrix, np.broadcast_to(c - eye, samples.shape)[..., None])[..., 0]
+            hidden |= (share[:, 0] > 0) & (share[:, 0] < 1 - 1e-6) & (share[:, 1] > 0) & (share[:, 1] < 1)
+        seen.append(samples[~hidden])
+    return np.concatenate(seen)
+
+
+@pytest.mark.parametrize("from_inside", [False, True])
+@pytest.mark.parametrize("seed", range(40))
+def test_the_nearest_visible_point_is_that_of_densely_sampled_edges_that_can_be_seen(seed, from_inside):
+    rng = np.random.default_rng(seed)
+    corners = 3 + seed % 7
+    outline, points = star(corners, rng), rng.uniform(-2, 2, (5, 2))
+    eye = rng.uniform(-0.05, 0.05, 2) if from_inside else rng.uniform(2, 4) * np.array([np.cos(seed), np.sin(seed)])
+    found = np.linalg.norm(nearest_on_visible(points, outline, np.tile(eye, (5, 1))) - points, axis=1)
+    sampled = np.linalg.norm(seen_samples(outline, eye)[:, None] - points, axis=2).min(axis=0)
+    np.testing.assert_allclose(found, sampled, atol=5e-3)
+
+
+def test_the_visible_faces_of_a_box_are_those_towards_the_eye():
+    box = np.array([[2.0, -1], [3, -1], [3, 1], [2, 1]])
+    points = np.array([[2.5, 0.2], [3.2, 0.0], [1.5, 0.0]])
+    ahead = nearest_on_visible(points, box, np.zeros((3, 2)))
+    np.testing.assert_allclose(ahead, [[2, 0.2], [2, 0], [2, 0]], atol=1e-12)
+    beside = nearest_on_visible(points, box, np.tile([0.0, -5.0], (3, 1)))
+    np.testing.assert_allclose(beside, [[2, 0.2], [3, -1], [2, 0]], atol=1e-12)
+    each = nearest_on_visible(points[:2], np.stack([box, box + 1]), np.zeros((2, 2)))
+    np.testing.assert_allclose(each, [[2, 0.2], [3, 0]], atol=1e-12)
+
+
+def test_points_segments_and_places_on_the_outline_are_seen_as_they_are():
+    post, wall = np.array([[1.0, 1.0]]), np.array([[1.0, -1.0], [1.0, 1.0]])
+    point = np.array([[3.0, 0.5]])
+    np.testing.assert_allclose(nearest_on_visible(point, post, np.zeros((1, 2))), post)
+    for eye in ([0.0, 0.0], [5.0, 0.0], [1.0, 0.0]):
+        np.testing.assert_allclose(nearest_on_visible(point, wall, np.array([eye])), [[1.0, 0.5]])
+    assert len(nearest_on_visible(np.empty((0, 2)), wall, np.empty((0, 2)))) == 0
 
 
 @settings(max_examples=60, deadline=None)

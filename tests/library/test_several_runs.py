@@ -42,7 +42,7 @@ def test_a_leaderboard_has_a_row_a_board_and_version_of_a_detector(made, cautiou
 
 def test_a_leaderboard_compares_its_detectors_in_pairs(made, cautious):
     pairs = uwbbench.leaderboard([made, cautious]).pairs
-    assert set(pairs["verdict"]) <= {"differs", "equal", "undecided", "too few groups", "undefined"}
+    assert set(pairs["verdict"]) <= {"differs", "equal", "not told apart", "too few", "undefined"}
     assert {"difference", "low", "high", "p_adjusted"} <= set(pairs)
 
 

@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 
 from uwbbench.api import Obstacle, Truth
-from uwbbench.measure.accuracy.judge import Region
+from uwbbench.measure.accuracy.region import Region
 from uwbbench.results.ground_truth import outlines, true_ranges
 
 

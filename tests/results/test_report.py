@@ -75,17 +75,37 @@ def test_captures_of_one_dataset_are_pooled_frame_by_frame(run: Run) -> None:
 
 
 def test_intervals_hold_the_value_where_there_are_enough_captures(run: Run) -> None:
-    folder = run("[paper-filtering]", "[{use: approach, params: {speed_m_s: 4.0, runs: 8}}]", scoring="frame")
+    folder = run(
+        "[paper-filtering]", "[{use: approach, params: {speed_m_s: 4.0, runs: 12}, repeats: []}]", scoring="frame"
+    )
     (row,) = Report(folder).leaderboard.to_dict("records")
-    assert row["groups"] == 8
+    assert row["groups"] == row["scenes"] == 12
     assert row["mae_low"] < row["mae"] < row["mae_high"]
-    assert "No intervals" not in markdown(Report(folder))
+    assert row["f1_outer_low"] <= row["f1_low"] <= row["f1"]
+    text = markdown(Report(folder))
+    assert "Intervals: inner ones, for scenes like these. Outer ones of F1, at worst: paper-filtering " in text
+    assert "12 scenes: if none of them fails, at most 26% of such scenes do" in text
 
 
-def test_too_few_groups_are_said_and_shown_one_by_one(run: Run) -> None:
-    text = markdown(Report(run("[oracle]", scoring="frame")))
-    assert "No intervals: fewer than 8 groups" in text
-    assert "F1 of each group, oracle: 1.000" in text
+def test_few_scenes_are_said_and_shown_one_by_one(run: Run) -> None:
+    datasets = "[{use: approach, params: {speed_m_s: 4.0, runs: 4}, repeats: []}]"
+    text = markdown(Report(run("[oracle]", datasets, scoring="frame")))
+    assert "Intervals: outer ones, as if each scene ended all or nothing" in text
+    assert "F1 of each scene, oracle: 1.000, 1.000, 1.000, 1.000" in text
+
+
+def test_runs_of_one_scene_are_one_piece_of_evidence_and_rank_nobody(run: Run) -> None:
+    folder = run("[oracle, paper-filtering]", "[{use: approach, params: {speed_m_s: 4.0, runs: 8}}]", scoring="frame")
+    report = Report(folder)
+    assert set(report.leaderboard["scenes"]) == {1}
+    assert report.leaderboard["rank_low"].isna().all()
+    assert [row[0]["detector"] for row in report.estimates] == ["oracle", "paper-filtering"]
+
+
+def test_a_run_folder_without_scenes_has_one_for_each_capture(run: Run) -> None:
+    folder = run("[oracle]", "[{use: approach, params: {speed_m_s: 4.0, runs: 8}}]", scoring="frame")
+    del folder.manifest["scenes"]
+    assert set(Report(folder).leaderboard["scenes"]) == {8}
 
 
 def test_the_two_tables_of_the_paper_have_a_row_for_each_channel_and_material(run: Run) -> None:

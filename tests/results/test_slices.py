@@ -9,11 +9,11 @@ import pytest
 
 from uwbbench.api.metric import Outcome
 from uwbbench.measure.accuracy.metrics.detection import Recall
-from uwbbench.measure.accuracy.stats import bootstrap
+from uwbbench.measure.accuracy.stats import estimated
 from uwbbench.results.results import Scored
 from uwbbench.results.slices import MOST_BINS, cuts, range_edges_m, slices
 
-SETTINGS: dict[str, Any] = {"resamples": 100, "confidence": 0.95, "seed": 0}
+SETTINGS: dict[str, Any] = {"confidence": 0.95, "seed": 0}
 
 
 def scored(capture: str, channel: int, material: str, range_m: list[float], found: list[int]) -> Scored:
@@ -52,7 +52,7 @@ ALL_OF_THEM = [
 
 def made(members: list[Scored]) -> dict[tuple[str, str, str], Any]:
     board = ("s", "simulated", "frame", "filtering")
-    known = {(board, "d"): {"recall": bootstrap(Recall, [one.outcome for one in members], **SETTINGS)}}
+    known = {(board, "d"): {"recall": estimated(Recall, [one.outcome for one in members])}}
     found = slices(members, {"recall": Recall}, range_edges_m(members), SETTINGS, known)
     return {(one.channel, one.material, one.span): one for one in found}
 

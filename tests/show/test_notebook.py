@@ -165,7 +165,7 @@ def test_scores_show_each_number_with_n_and_interval(approach, found):
     assert f"{scores.recall:.3f}" in text
     assert f"{scores.retained} detections" in text
     assert f"{scores.frames} frames" in text
-    assert "bootstrap over" in text
+    assert "within this recording only" in text
 
 
 def test_scores_show_both_tables_where_positions_are_clustered(approach, found):
@@ -177,7 +177,7 @@ def test_scores_show_both_tables_where_positions_are_clustered(approach, found):
 def test_too_few_blocks_give_no_interval_and_a_reason(approach, found):
     short = dataclasses.replace(_cut(approach, 100))
     scores = uwbbench.score(uwbbench.load_detector("paper-filtering").run(short), short)
-    assert "too few" in shown(scores).text
+    assert "shorter than 30 s" in shown(scores).text
 
 
 def _cut(capture: Capture, frames: int) -> Capture:

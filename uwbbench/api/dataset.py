@@ -81,6 +81,13 @@ class Dataset(Generic[P]):
         """Names of the captures, found without reading them."""
         raise NotImplementedError
 
+    def scene(self, name: str) -> str:
+        """Scene or set-up that a capture is of, by the capture's name; captures of one scene repeat one another.
+
+        Evidence is counted in scenes. Unless an adapter says otherwise, each capture is of a scene of its own.
+        """
+        return name
+
     def open(self, name: str) -> Capture:
         """Read one capture.
 

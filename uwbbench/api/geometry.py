@@ -180,6 +180,66 @@ def nearest_on_outline(points_m: FloatArray, outline_m: FloatArray) -> FloatArra
     return np.asarray(best)
 
 
+def nearest_on_visible(points_m: FloatArray, outline_m: FloatArray, eyes_m: FloatArray) -> FloatArray:
+    """Nearest point to each point on the part of a closed flat outline that can be seen from somewhere.
+
+    An edge is cut where the rays through the vertices meet it; between two cuts it is seen as a whole or not at all.
+    Where nothing is seen, as from a place on the outline itself, all of the outline counts.
+
+    Parameters
+    ----------
+    points_m : (n, 2) array
+    outline_m : (vertices, 2) or (n, vertices, 2) array
+        One outline for all points, or one for each; its edges do not cross. One vertex is a point target; two are a
+        segment.
+    eyes_m : (n, 2) array
+        Where each point's outline is seen from.
+
+    Returns
+    -------
+    (n, 2) array
+    """
+    outlines = np.broadcast_to(outline_m, (len(points_m), *np.shape(outline_m)[-2:]))
+    nearest = np.empty((len(points_m), 2))
+    most = max(1, 500_000 // outlines.shape[1] ** 3)
+    for first in range(0, len(points_m), most):
+        rows = slice(first, first + most)
+        nearest[rows] = _nearest_seen(points_m[rows, None, None], outlines[rows], eyes_m[rows, None])
+    return nearest
+
+
+def _nearest_seen(points: FloatArray, outlines: FloatArray, eyes: FloatArray) -> FloatArray:
+    """Nearest points (n, 2) to points (n, 1, 1, 2) on what eyes (n, 1, 2) see of outlines (n, vertices, 2)."""
+    edges = 1 if outlines.shape[1] == 2 else outlines.shape[1]  # a segment is there and back
+    starts, edge = outlines[:, :edges], (np.roll(outlines, -1, axis=1) - outlines)[:, :edges]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        rays = (outlines - eyes)[:, None]
+        cuts = _cross((eyes - starts)[:, :, None], rays) / _cross(edge[:, :, None], rays)
+        cuts = np.sort(np.clip(np.nan_to_num(cuts, nan=0.0, posinf=1.0, neginf=0.0), 0.0, 1.0), axis=2)
+        low = np.concatenate([np.zeros_like(cuts[:, :, :1]), cuts], axis=2)
+        high = np.concatenate([cuts, np.ones_like(cuts[:, :, :1])], axis=2)
+        middle = starts[:, :, None] + ((low + high) / 2)[..., None] * edge[:, :, None]
+        # The way to the middle of a piece (n, edges, pieces) is stopped by any other edge that it meets.
+        way, offset = (middle - eyes[:, :, None])[:, :, :, None], (starts - eyes)[:, None, None]
+        across = _cross(way, edge[:, None, None])
+        on_way, on_edge = _cross(offset, edge[:, None, None]) / across, _cross(offset, way) / across
+        stopped = (across != 0) & (on_way > 0) & (on_way < 1 - 1e-9) & (on_edge >= 0) & (on_edge <= 1)
+        stopped &= ~np.eye(edges, dtype=bool)[:, None]
+        seen = ~stopped.any(axis=3) & ((high - low > 1e-12) | (outlines.shape[1] == 1))
+        seen |= ~seen.any(axis=(1, 2), keepdims=True)
+        length2 = np.sum(edge**2, axis=-1)[:, :, None]
+        along = np.where(length2 > 0, np.sum((points - starts[:, :, None]) * edge[:, :, None], axis=-1) / length2, 0.0)
+    foot = starts[:, :, None] + np.clip(along, low, high)[..., None] * edge[:, :, None]
+    distance = np.where(seen, np.linalg.norm(foot - points, axis=-1), np.inf)
+    best = np.argmin(distance.reshape(len(distance), -1), axis=1)
+    return np.asarray(foot.reshape(len(foot), -1, 2)[np.arange(len(foot)), best])
+
+
+def _cross(a: FloatArray, b: FloatArray) -> FloatArray:
+    """Cross product of flat vectors (..., 2)."""
+    return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])
+
+
 def inside(points_m: FloatArray, outline_m: FloatArray) -> BoolArray:
     """Whether 2-D points (n, 2) lie inside a closed outline (vertices, 2) or (n, vertices, 2), by the crossing rule."""
     outline = np.broadcast_to(outline_m, (len(points_m), *np.shape(outline_m)[-2:]))

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from uwbbench.api.arrays import BoolArray, FloatArray, lock_fields
-from uwbbench.api.geometry import nearest_on_outline, receiver_pose, rotate_z, segments_cross
+from uwbbench.api.geometry import nearest_on_outline, nearest_on_visible, receiver_pose, rotate_z, segments_cross
 from uwbbench.api.radar import Radar
 
 
@@ -144,10 +144,23 @@ class Truth:
                     occluded[:, column] |= segments_cross(receiver_m[:, :2], point[:, :2], flat)
         return Sight(range_m, azimuth_rad, occluded)
 
-    def distance_to(self, points_m: FloatArray, frame: np.ndarray) -> FloatArray:
-        """Distance (n, objects) from world points (n, 2), seen in the given frames, to each outline; 0 inside."""
+    def distance_to(self, points_m: FloatArray, frame: np.ndarray, eyes_m: FloatArray | None = None) -> FloatArray:
+        """Distance (n, objects) from world points to each outline; 0 inside.
+
+        Parameters
+        ----------
+        points_m : (n, 2) array
+        frame : (n,) int array
+            In which each is seen.
+        eyes_m : (n, 2) array, optional
+            Where each is seen from: distances are then those to what can be seen of an outline from there.
+        """
         distance = np.full((len(points_m), len(self.objects)), np.nan)
         for column, obstacle in enumerate(self.objects):
             outline = obstacle.outline_at(frame)[..., :2]
-            distance[:, column] = np.linalg.norm(points_m - nearest_on_outline(points_m, outline), axis=1)
+            if eyes_m is None:
+                nearest_m = nearest_on_outline(points_m, outline)
+            else:
+                nearest_m = nearest_on_visible(points_m, outline, eyes_m)
+            distance[:, column] = np.linalg.norm(points_m - nearest_m, axis=1)
         return distance

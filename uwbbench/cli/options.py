@@ -19,6 +19,13 @@ class Scoring(StrEnum):
     OBJECT = "object"
 
 
+class Surface(StrEnum):
+    """What the error of a position is the distance to."""
+
+    OUTLINE = "outline"
+    VISIBLE = "visible"
+
+
 CaptureFile = Annotated[Path, typer.Argument(metavar="CAPTURE", help="Capture file (.h5).", show_default=False)]
 Detector = Annotated[
     str, typer.Option("--detector", "-d", metavar="NAME|FILE", help="Detector by name, or a YAML file.")

@@ -160,6 +160,10 @@ def rescore(
         float | None,
         typer.Option(metavar="METRES", help="Largest error of a true detection. As before if left out."),
     ] = None,
+    surface: Annotated[
+        options.Surface | None,
+        typer.Option(help="What errors of positions are distances to. As before if left out.", show_default=False),
+    ] = None,
     json: options.Json = False,
 ) -> None:
     """Score a run again by other rules. Nothing is run: the stored detections are judged anew."""
@@ -171,8 +175,9 @@ def rescore(
     folder = RunFolder(run)
     before = folder.rules
     chosen = scoring or [options.Scoring(rules.scoring) for rules in before]
-    gate = before[0].gate_m if gate_m is None else gate_m
-    score_again(folder, [replace(before[0], scoring=one.value, gate_m=gate) for one in dict.fromkeys(chosen)])
+    changed = before[0] if gate_m is None else replace(before[0], gate_m=gate_m)
+    changed = changed if surface is None else replace(changed, surface=surface.value)
+    score_again(folder, [replace(changed, scoring=one.value) for one in dict.fromkeys(chosen)])
     _conclude(folder, None, json=json)
 
 

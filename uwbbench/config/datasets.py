@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import fnmatch
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
-from pydantic import Field
+from pydantic import Field, field_validator
 
 from uwbbench.api import registry
 from uwbbench.api.errors import CaptureError, ConfigError, nearest
@@ -27,6 +28,23 @@ class DatasetUse(ConfigModel):
     captures: list[str] | None = Field(
         default=None, min_length=1, description="Names, or patterns such as 'ch9-*'; all if left out."
     )
+    repeats: str | list[Annotated[list[str], Field(min_length=1)]] | None = Field(
+        default=None,
+        description=(
+            "Which captures repeat a scene: a regular expression of the part of their names by which repeats differ, "
+            "such as '-run[0-9]+$', or lists of names or patterns; [] if none does; as the dataset says if left out."
+        ),
+    )
+
+    @field_validator("repeats")
+    @classmethod
+    def _compiles(cls, value: str | list[list[str]] | None) -> str | list[list[str]] | None:
+        if isinstance(value, str):
+            try:
+                re.compile(value)
+            except re.error as error:
+                raise ValueError(f"is no regular expression: {error}") from None
+        return value
 
 
 @dataclass(frozen=True)
@@ -44,6 +62,9 @@ class DatasetSource:
         Patterns of the names to take; None for all.
     roots : tuple of str
         Folders to search.
+    repeats : str, tuple of tuples of str, or None
+        Part of names by which repeats of a scene differ, or lists of captures that repeat one another; None where the
+        dataset says it.
     """
 
     label: str
@@ -51,6 +72,39 @@ class DatasetSource:
     params: dict[str, Any] = field(default_factory=dict)
     captures: tuple[str, ...] | None = None
     roots: tuple[str, ...] = ()
+    repeats: str | tuple[tuple[str, ...], ...] | None = None
+
+    def to_dict(self) -> dict[str, Any]:
+        """As plain values, without the folders of this machine."""
+        about = {"label": self.label, "use": self.use, "params": self.params, "captures": self.captures}
+        return about if self.repeats is None else {**about, "repeats": self.repeats}
+
+    def scenes(self, names: Sequence[str]) -> dict[str, str]:
+        """Scene or set-up of each chosen capture, by name: captures of one scene repeat one another.
+
+        Raises
+        ------
+        CaptureError
+            If ``repeats`` fits no capture.
+        """
+        if self.repeats is None:
+            dataset = open_dataset(self.use, self.params, [Path(root) for root in self.roots])
+            return {name: str(dataset.scene(name)) for name in names}
+        if isinstance(self.repeats, str):
+            part = re.compile(self.repeats)
+            if not any(part.search(name) for name in names):
+                raise CaptureError(f"dataset '{self.label}': 'repeats: {self.repeats}' fits no capture name")
+            return {name: part.sub("", name) for name in names}
+        scenes = {name: name for name in names}
+        for group in self.repeats:
+            for pattern in group:
+                if not any(_fits(name, (pattern,)) for name in names):
+                    raise CaptureError(
+                        f"dataset '{self.label}': 'repeats' names no capture '{pattern}'.{nearest(pattern, names)}"
+                    )
+            members = [name for name in names if _fits(name, group)]
+            scenes.update(dict.fromkeys(members, members[0]))
+        return scenes
 
     def references(self) -> list[CaptureRef]:
         """References to the chosen captures.
@@ -106,5 +160,6 @@ def dataset_sources(
         if label in {other.label for other in sources}:
             raise ConfigError(f"{source.place(at)}: dataset '{label}' appears twice; give one of them another 'name'")
         patterns = None if item.captures is None else tuple(item.captures)
-        sources.append(DatasetSource(label, item.use, item.params, patterns, tuple(roots)))
+        repeats = tuple(map(tuple, item.repeats)) if isinstance(item.repeats, list) else item.repeats
+        sources.append(DatasetSource(label, item.use, item.params, patterns, tuple(roots), repeats))
     return tuple(sources)

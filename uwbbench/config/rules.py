@@ -15,6 +15,9 @@ Scoring = Literal["frame", "peak", "object"]
 Table = Literal["filtering", "mapping"]
 """After which half of a detector: its filters, or its clustering."""
 
+Surface = Literal["outline", "visible"]
+"""What the error of a position is the distance to: the outline, 0 inside it, or what the receiver sees of it."""
+
 GateRadius = Annotated[float, Field(default=0.20, gt=0, description="Largest error of a true detection.")]
 """In metres."""
 
@@ -81,5 +84,5 @@ MetricsUse = Annotated[
 class IntervalModel(ConfigModel):
     """How uncertainty is estimated."""
 
-    resamples: int = Field(default=1000, ge=100, description="Bootstrap resamples.")
+    resamples: int = Field(default=1000, ge=100, description="No longer used: intervals need no resampling.")
     confidence: float = Field(default=0.95, gt=0, lt=1)

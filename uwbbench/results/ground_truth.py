@@ -8,7 +8,7 @@ import numpy as np
 
 from uwbbench.api.arrays import BoolArray, FloatArray, IntArray
 from uwbbench.api.capture import CaptureHeader
-from uwbbench.measure.accuracy.judge import Region
+from uwbbench.measure.accuracy.region import Region
 
 
 @dataclass(frozen=True)

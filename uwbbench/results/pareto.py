@@ -5,9 +5,9 @@ Conventions
 * Speed is the time a frame relative to the reference detector of the run, measured in alternating blocks; it is what
   travels between machines. Over several timed captures it is the geometric mean.
 * A detector is on the front if no other one is at least as fast and at least as good, and better in one of them.
-* The probability of being on the front is the share of bootstrap draws in which it is. A draw takes captures (or
-  blocks of a second, where captures are few) anew, the same for all detectors, and a time ratio for each detector
-  from a log-normal distribution through its stored interval, as the run keeps the ratio and its interval only.
+* The probability of being on the front is the share of draws in which it is. A draw takes values of all detectors from
+  their joint t distribution over scenes, and a time ratio for each detector from a log-normal distribution through its
+  stored interval, as the run keeps the ratio and its interval only. Below six scenes nothing is drawn.
 * Detectors are compared on the captures that all of them were scored on. One that finds nothing is not drawn.
 """
 
@@ -23,9 +23,11 @@ import numpy as np
 
 from uwbbench.api.arrays import BoolArray, FloatArray
 from uwbbench.api.metric import Metric
-from uwbbench.measure.accuracy.stats import Estimate, bootstrap, paired_draws
-from uwbbench.results.results import Scored
+from uwbbench.measure.accuracy.stats import Estimate, drawn, estimated
+from uwbbench.results.results import Scored, scenes_of
 from uwbbench.run.folder.journal import Entry
+
+DRAWS = 2000
 
 NORMAL_975 = 1.959964
 """The 97.5 % quantile of the normal distribution: half the width of a 95 % interval."""
@@ -75,7 +77,7 @@ class Point:
     on_front : bool
         By the values themselves.
     probability : float
-        Of being on the front; NaN where there are too few groups to draw from.
+        Of being on the front; NaN where there are too few scenes.
     """
 
     detector: str
@@ -137,14 +139,16 @@ def points(
     speeds : mapping of str to Speed
     metric : type of Metric
     settings : mapping
-        ``resamples``, ``confidence`` and ``seed`` of the intervals.
+        ``confidence`` and ``seed`` of intervals and draws.
     """
     timed = {name: scored for name, scored in members.items() if name in speeds}
     shared = set.intersection(*(set(_by_capture(scored)) for scored in timed.values())) if timed else set()
-    series, estimates = {}, {}
+    known_scenes = scenes_of(one for scored in timed.values() for one in scored)
+    series, estimates, scenes = {}, {}, list[str]()
     for name, scored in timed.items():
-        outcomes = [one.outcome for capture, one in sorted(_by_capture(scored).items()) if capture in shared]
-        estimate = bootstrap(metric, outcomes, **settings)
+        chosen = [one for capture, one in sorted(_by_capture(scored).items()) if capture in shared]
+        outcomes, scenes = [one.outcome for one in chosen], [known_scenes[one.capture] for one in chosen]
+        estimate = estimated(metric, outcomes, scenes, confidence=settings["confidence"])
         if outcomes and any(outcome.tp.any() for outcome in outcomes) and not math.isnan(estimate.value):
             series[name], estimates[name] = outcomes, estimate
     if not series:
@@ -152,13 +156,13 @@ def points(
     names = list(series)
     logs = np.array([math.log(speeds[name].ratio) for name in names])
     best = front(logs[None], np.array([[-metric.merit(estimates[name].value) for name in names]]))[0]
-    resamples, seed = settings["resamples"], settings["seed"]
-    errors = -metric.merit(paired_draws(metric, list(series.values()), resamples=resamples, seed=seed))
+    seed = settings["seed"]
+    errors = -metric.merit(drawn(metric, list(series.values()), scenes, draws=DRAWS, seed=seed))
     chance = np.full(len(names), math.nan)
     if len(errors):
         spread = np.array([speeds[name].spread for name in names])
-        drawn = np.random.default_rng([seed, 1]).normal(logs, spread, size=errors.shape)
-        chance = front(drawn, errors).mean(axis=0)
+        costs = np.random.default_rng([seed, 1]).normal(logs, spread, size=errors.shape)
+        chance = front(costs, errors).mean(axis=0)
     placed = [
         Point(name, speeds[name], estimates[name], bool(on), float(p))
         for name, on, p in zip(names, best, chance, strict=True)

@@ -30,10 +30,12 @@ from uwbbench.measure.accuracy.stats import Estimate
 from uwbbench.results import published
 from uwbbench.results.error_causes import ErrorCauses, error_causes
 from uwbbench.results.limits import Limits
+from uwbbench.results.pareto import speeds_of_run
 from uwbbench.results.ranked_curves import CurveKey, RankedCurve, ranked_curve
-from uwbbench.results.results import Scored, errors_in, estimates_of, scored
+from uwbbench.results.results import Scored, errors_in, estimates_of, scenes_of, scored
 from uwbbench.results.set_aside import SetAside, set_aside
 from uwbbench.results.slices import Board
+from uwbbench.results.verdicts import Ranks, ranks_of
 from uwbbench.run.folder.folder import RunFolder
 from uwbbench.run.folder.journal import Entry
 from uwbbench.run.folder.reported import REPORTED_FACT
@@ -103,14 +105,42 @@ class Report:
     @cached_property
     def estimates(self) -> list[tuple[dict[str, Any], dict[str, Estimate]]]:
         """Leaderboard rows: what each is of, and its estimates by metric."""
-        groups: dict[tuple[str, ...], list[Scored]] = defaultdict(list)
-        for one in self.scored:
-            groups[one.dataset, one.source, one.scoring, one.table, one.detector].append(one)
-        rows = [
-            (self._about(members), estimates_of(self.metrics, members, self.settings)) for members in groups.values()
-        ]
-        rows.sort(key=lambda row: self._rank(*row))
+        rows = []
+        for board, ranks in self.ranks.items():
+            for place, detector in enumerate(ranks.order, start=1):
+                low, high = ranks.sets.get(detector, (None, None))
+                about = {"place": place, "rank_low": low, "rank_high": high}
+                members = self.boards[board][detector]
+                rows.append((self._about(members) | about, self._estimates[board][detector]))
         return rows
+
+    @cached_property
+    def boards(self) -> dict[Board, dict[str, list[Scored]]]:
+        """What each detector did on each board."""
+        boards: dict[Board, dict[str, list[Scored]]] = defaultdict(dict)
+        for one in sorted(self.scored, key=lambda one: self.detectors.index(one.detector)):
+            board = one.dataset, one.source, one.scoring, one.table
+            boards[board].setdefault(one.detector, []).append(one)
+        return dict(sorted(boards.items()))
+
+    @cached_property
+    def ranks(self) -> dict[Board, Ranks]:
+        """Order, rank sets and comparisons of each board."""
+        speeds = speeds_of_run(self.entries)
+        times = {
+            board[0]: {name: s.ratio for (at, name), s in speeds.items() if at == board[0]} for board in self.boards
+        }
+        return {
+            board: ranks_of(members, self.metrics, self._estimates[board], times[board[0]])
+            for board, members in self.boards.items()
+        }
+
+    @cached_property
+    def _estimates(self) -> dict[Board, dict[str, dict[str, Estimate]]]:
+        return {
+            board: {name: estimates_of(self.metrics, scored, self.settings) for name, scored in members.items()}
+            for board, members in self.boards.items()
+        }
 
     def _about(self, members: Sequence[Scored]) -> dict[str, Any]:
         first = members[0]
@@ -119,6 +149,7 @@ class Report:
         chance = np.array([math.nan if (c := one.numbers["chance_recall"]) is None else c for one in members], float)
         return about | {
             "captures": len(members),
+            "scenes": len(set(scenes_of(members).values())),
             "frames": sum(one.frames for one in members),
             "invalid": sum(one.frames - one.processed for one in members),
             "unprocessed": sum(int(one.numbers["unprocessed"]) for one in members),
@@ -145,13 +176,6 @@ class Report:
 
     def _of_kind(self, kind: str) -> list[Entry]:
         return [entry for entry in self.entries if entry.kind == kind and entry.status == "done"]
-
-    def _rank(self, about: dict[str, Any], estimates: dict[str, Estimate]) -> tuple[Any, ...]:
-        """Best first, by the metric that ranks. Undefined ones last, in the order of the experiment."""
-        name = self.metrics.ranking(exhaustive=about["exhaustive"])
-        merit = self.metrics[name].merit(estimates[name].value)
-        table = (about["dataset"], about["source"], about["scoring"], about["table"])
-        return *table, math.inf if math.isnan(merit) else -merit, self.detectors.index(about["detector"])
 
     @cached_property
     def leaderboard(self) -> pd.DataFrame:
@@ -356,6 +380,8 @@ def _columns(estimates: Mapping[str, Estimate]) -> dict[str, float]:
             f"{name}_low": estimate.low,
             f"{name}_high": estimate.high,
             f"{name}_n": estimate.n,
+            f"{name}_outer_low": estimate.outer_low,
+            f"{name}_outer_high": estimate.outer_high,
         }
     return columns
 

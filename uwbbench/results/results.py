@@ -16,7 +16,7 @@ from uwbbench.api.metric import Outcome
 from uwbbench.measure.accuracy.judge import Scene, judge
 from uwbbench.measure.accuracy.metrics.choice import MetricChoice
 from uwbbench.measure.accuracy.scoring import ScoringRules, tables_of
-from uwbbench.measure.accuracy.stats import Estimate, bootstrap
+from uwbbench.measure.accuracy.stats import Estimate, estimated
 from uwbbench.run.folder.folder import RunFolder
 from uwbbench.run.folder.scored import column_of
 
@@ -39,6 +39,8 @@ class Scored:
     outcome : Outcome
     range_m : (scored frames,) array
         True range of the nearest visible obstacle; NaN where there is none.
+    scene : str
+        Scene or set-up that the capture is of, as captures of one scene repeat one another; empty: one of its own.
     """
 
     detector: str
@@ -54,6 +56,7 @@ class Scored:
     numbers: Mapping[str, Any]
     outcome: Outcome
     range_m: FloatArray
+    scene: str = ""
 
 
 def scored(folder: RunFolder) -> list[Scored]:
@@ -107,6 +110,7 @@ def _scored(folder: RunFolder, rows: Mapping[Any, Any], rules: Sequence[ScoringR
                     numbers=rows[key],
                     outcome=outcome,
                     range_m=_nearest_m(scene, rule),
+                    scene=folder.scene(entry.dataset, entry.capture),
                 )
 
 
@@ -127,16 +131,27 @@ def estimates_of(metrics: MetricChoice, members: Sequence[Scored], settings: Map
     members : sequence of Scored
         What one detector did on each capture.
     settings : mapping
-        ``resamples``, ``confidence`` and ``seed`` of the intervals.
+        ``confidence`` of the intervals.
     """
-    outcomes = [one.outcome for one in members]
-    estimates = {name: bootstrap(metric, outcomes, **settings) for name, metric in metrics.items()}
+    outcomes, known_scenes = [one.outcome for one in members], scenes_of(members)
+    scenes = [known_scenes[one.capture] for one in members]
+    confidence = settings["confidence"]
+    estimates = {name: estimated(metric, outcomes, scenes, confidence=confidence) for name, metric in metrics.items()}
     for name in metrics.absent:
         stored = [one.numbers.get(column_of(name, unit)) for one in members for unit in ("", "m")]
         known = [value for value in stored if isinstance(value, float) and not math.isnan(value)]
         if known:
             estimates[name] = Estimate(float(np.mean(known)), math.nan, math.nan, len(known), estimates[name].groups)
     return estimates
+
+
+def scenes_of(scored: Iterable[Scored]) -> dict[str, str]:
+    """Scene of each capture of a board; where runs name it and older ones do not, that of those that do."""
+    scenes: dict[str, str] = {}
+    for one in scored:
+        if scenes.get(one.capture, one.capture) == one.capture:
+            scenes[one.capture] = one.scene or one.capture
+    return scenes
 
 
 def errors_in(outcomes: Iterable[Outcome]) -> int:

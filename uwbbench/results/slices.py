@@ -21,8 +21,8 @@ import numpy as np
 
 from uwbbench.api.arrays import FloatArray
 from uwbbench.api.metric import Metric, Outcome
-from uwbbench.measure.accuracy.stats import Estimate, bootstrap, subset
-from uwbbench.results.results import Scored, errors_in
+from uwbbench.measure.accuracy.stats import Estimate, estimated, evaluate, samples_behind, subset
+from uwbbench.results.results import Scored, errors_in, scenes_of
 
 WIDTHS_M = (0.25, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
 MOST_BINS = 8
@@ -105,7 +105,7 @@ def slices(
         By name.
     edges_m : (bins + 1,) array
     settings : mapping
-        ``resamples``, ``confidence`` and ``seed`` of the intervals.
+        ``confidence`` of the intervals.
     known : mapping
         Estimates of whole boards, by board and detector, which are there already.
     """
@@ -113,26 +113,37 @@ def slices(
     for one in scored:
         boards[one.dataset, one.source, one.scoring, one.table].append(one)
     for board, members in boards.items():
-        parts = {id(one): _spans(one, edges_m) for one in members}
+        parts, scene = {id(one): _spans(one, edges_m) for one in members}, scenes_of(members)
         for (channel, material), (same, chosen) in cuts(members).items():
             if same != (channel, material):
                 continue
-            groups: dict[tuple[str, str], list[Outcome]] = defaultdict(list)
+            groups: dict[tuple[str, str], list[tuple[Outcome, str]]] = defaultdict(list)
             for one in chosen:
-                groups[one.detector, ALL].append(one.outcome)
+                groups[one.detector, ALL].append((one.outcome, scene[one.capture]))
                 for span, outcome in parts[id(one)].items():
-                    groups[one.detector, span].append(outcome)
-            for (detector, span), outcomes in groups.items():
+                    groups[one.detector, span].append((outcome, scene[one.capture]))
+            for (detector, span), held in groups.items():
+                outcomes, scenes = [outcome for outcome, _ in held], [name for _, name in held]
                 threefold = ALL not in (channel, material, span)
                 if (channel, material, span) == (ALL, ALL, ALL):
                     estimates = known[board, detector]
                 else:
-                    how = {**settings, "resamples": 0} if threefold else settings
-                    estimates = {name: bootstrap(metric, outcomes, **how) for name, metric in metrics.items()}
+                    estimates = {
+                        name: _bare(metric, outcomes, scenes)
+                        if threefold
+                        else estimated(metric, outcomes, scenes, confidence=settings["confidence"])
+                        for name, metric in metrics.items()
+                    }
                 frames = sum(len(outcome.group) for outcome in outcomes)
                 hits = sum(int(outcome.tp.sum()) for outcome in outcomes)
                 counts = (len(outcomes), frames, hits, errors_in(outcomes))
                 yield Slice(board, channel, material, span, detector, *counts, estimates)
+
+
+def _bare(metric: type[Metric], outcomes: Sequence[Outcome], scenes: Sequence[str]) -> Estimate:
+    """Value without an interval."""
+    value = evaluate(metric, outcomes)
+    return Estimate(value, math.nan, math.nan, samples_behind(metric, outcomes, value), len(set(scenes)))
 
 
 def cuts(members: Sequence[Scored]) -> dict[tuple[str, str], tuple[tuple[str, str], list[Scored]]]:

@@ -125,6 +125,7 @@ def _created(experiment: Experiment, todo: Plan, out: Path | None, jobs: int) ->
     manifest = {
         "experiment": experiment.to_dict(),
         **_code(experiment, todo),
+        "scenes": todo.scenes,
         "sessions": [environment.session(jobs)],
     }
     return RunFolder.create(out, manifest)
@@ -162,6 +163,7 @@ def _resumed(experiment: Experiment, todo: Plan, out: Path | None, jobs: int) ->
         )
     folder.update_manifest(
         **_code(experiment, todo),
+        scenes={**folder.manifest.get("scenes", {}), **todo.scenes},
         sessions=[*folder.manifest["sessions"], environment.session(jobs)],
     )
     return folder

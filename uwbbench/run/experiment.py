@@ -20,7 +20,7 @@ from uwbbench.config.detector import DetectorConfig, read_detector
 from uwbbench.config.extends import extended, placed
 from uwbbench.config.given import Given, read_given
 from uwbbench.config.model import ConfigModel, DetectorName
-from uwbbench.config.rules import GateRadius, IntervalModel, MetricsUse, RegionModel, Scoring, Strongest
+from uwbbench.config.rules import GateRadius, IntervalModel, MetricsUse, RegionModel, Scoring, Strongest, Surface
 from uwbbench.config.source import data_roots
 from uwbbench.measure.latency.settings import LatencyModel
 
@@ -74,6 +74,11 @@ class ExperimentModel(ConfigModel):
     gate_m: GateRadius
     region: RegionModel = Field(default_factory=RegionModel)
     strongest: Strongest
+    surface: Surface = Field(
+        default="outline",
+        description="What the error of a position is the distance to: 'outline', 0 inside it, or 'visible', the part "
+        "of it that the receiver can see in that frame.",
+    )
     metrics: MetricsUse = Field(
         default_factory=list,
         description="Registered metrics to show besides the default ones, of which the first ranks, if it has a better "
@@ -81,7 +86,7 @@ class ExperimentModel(ConfigModel):
     )
     latency: LatencyModel = Field(default_factory=LatencyModel)
     stability: bool = Field(default=True, description="Put the hard cases to each detector; see 'uwbbench stability'.")
-    seed: int = Field(default=0, ge=0, description="Of the resampling behind the intervals.")
+    seed: int = Field(default=0, ge=0, description="Of what reports draw: the probability of being on a front.")
     intervals: IntervalModel = Field(default_factory=IntervalModel)
 
     @field_validator("scoring", mode="before")
@@ -114,6 +119,7 @@ class Experiment:
     gate_m : float
     region : RegionModel
     strongest : int or None
+    surface : {"outline", "visible"}
     metrics : tuple of str or mapping
         As the file has it: metrics besides the default ones, or exactly which of them are shown where.
     latency : LatencyModel
@@ -130,6 +136,7 @@ class Experiment:
     gate_m: float
     region: RegionModel
     strongest: int | None
+    surface: Surface
     metrics: tuple[str, ...] | Mapping[str, Any]
     latency: LatencyModel
     stability: bool
@@ -143,7 +150,7 @@ class Experiment:
 
     def to_dict(self) -> dict[str, Any]:
         """Resolved experiment as plain values, without the folders of this machine."""
-        datasets = [{"label": d.label, "use": d.use, "params": d.params, "captures": d.captures} for d in self.datasets]
+        datasets = [dataset.to_dict() for dataset in self.datasets]
         return {
             "schema": 1,
             "name": self.name,
@@ -154,6 +161,7 @@ class Experiment:
             "gate_m": self.gate_m,
             "region": self.region.model_dump(),
             "strongest": self.strongest,
+            **({} if self.surface == "outline" else {"surface": self.surface}),  # as versions without it resume
             "metrics": dict(self.metrics) if isinstance(self.metrics, Mapping) else list(self.metrics),
             "latency": self.latency.model_dump(),
             "stability": self.stability,
@@ -203,6 +211,7 @@ def read_experiment(name: Given, changes: Mapping[str, Any] | None = None, data_
         gate_m=model.gate_m,
         region=model.region,
         strongest=model.strongest,
+        surface=model.surface,
         metrics=metrics,
         latency=model.latency,
         stability=model.stability,

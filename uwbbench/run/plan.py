@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 from uwbbench.api.interruption import by_plugin
@@ -55,10 +55,13 @@ class Plan:
         Accuracy first, captures together; latency last.
     failures : tuple of Entry
         Datasets whose captures could not be listed.
+    scenes : dict of dict
+        Scene of each capture, by dataset and capture.
     """
 
     units: tuple[Unit, ...]
     failures: tuple[Entry, ...]
+    scenes: dict[str, dict[str, str]] = field(default_factory=dict)
 
 
 def plan(experiment: Experiment) -> Plan:
@@ -66,9 +69,11 @@ def plan(experiment: Experiment) -> Plan:
     accuracy: list[Unit] = []
     latency: list[Unit] = []
     failures: list[Entry] = []
+    scenes: dict[str, dict[str, str]] = {}
     for source in experiment.datasets:
         try:
             references = source.references()
+            scenes[source.label] = source.scenes([ref.name for ref in references])
         except BaseException as error:  # an adapter may raise anything; the other datasets still run
             if not by_plugin(error):
                 raise
@@ -87,7 +92,7 @@ def plan(experiment: Experiment) -> Plan:
         accuracy += [Unit("accuracy", d, source.label, ref) for ref in references for d in experiment.detectors]
         timed = references if experiment.latency.captures == "all" else references[:1]
         latency += [Unit("latency", d, source.label, ref) for ref in timed for d in experiment.runnable]
-    return Plan(tuple(accuracy + (latency if experiment.latency.enabled else [])), tuple(failures))
+    return Plan(tuple(accuracy + (latency if experiment.latency.enabled else [])), tuple(failures), scenes)
 
 
 def reason_of(error: BaseException) -> str:

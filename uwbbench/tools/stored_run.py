@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from uwbbench.api.arrays import FloatArray
     from uwbbench.api.capture import CaptureHeader
     from uwbbench.api.detections import Detections
+    from uwbbench.config.rules import Surface
     from uwbbench.run.folder.verify import Verification
 
 _UNIT = ("kind", "detector", "dataset", "capture", "status", "reason")
@@ -228,7 +229,12 @@ class Run:
         with read_safely(self.path):
             return written.write_figures(self._report, Path(folder), data_roots(self._data_dir), force=force)
 
-    def rescore(self, scoring: str | Sequence[str] | None = None, gate_m: float | None = None) -> None:
+    def rescore(
+        self,
+        scoring: str | Sequence[str] | None = None,
+        gate_m: float | None = None,
+        surface: Surface | None = None,
+    ) -> None:
         """Score the stored detections again by other rules, and write the reports in the folder anew.
 
         Parameters
@@ -237,6 +243,8 @@ class Run:
             ``frame``, ``peak``, ``object``; as before by default.
         gate_m : float, optional
             Largest error of a true detection; as before by default.
+        surface : {"outline", "visible"}, optional
+            What errors of positions are distances to; as before by default.
 
         Raises
         ------
@@ -252,9 +260,10 @@ class Run:
         names = (
             [rule.scoring for rule in before] if scoring is None else [scoring] if isinstance(scoring, str) else scoring
         )
-        gate = before[0].gate_m if gate_m is None else gate_m
+        changed = {"gate_m": gate_m, "surface": surface}
+        rule = dataclasses.replace(before[0], **{key: one for key, one in changed.items() if one is not None})  # type: ignore[arg-type]
         # By name only: an unknown scoring is refused by the rules themselves.
-        rules = [dataclasses.replace(before[0], scoring=one, gate_m=gate) for one in dict.fromkeys(names)]  # type: ignore[arg-type]
+        rules = [dataclasses.replace(rule, scoring=one) for one in dict.fromkeys(names)]  # type: ignore[arg-type]
         with read_safely(self.path):
             rescore(self.folder, rules)
         self.write_reports()

@@ -84,6 +84,10 @@ class Simulated(Dataset[SimulatedParams]):
         receivers = list(self._runs[run][0].model.receivers)
         return {run: receivers[0]} if len(receivers) == 1 else {f"{run}/{name}": name for name in receivers}
 
+    def scene(self, name: str) -> str:
+        """Scene with its variant; runs of it, and receivers on one robot, are no other scenes."""
+        return next((scene.name for run, (scene, _) in self._runs.items() if name in self._captures(run)), name)
+
     def open(self, name: str) -> Capture:
         """Simulate the run that a capture belongs to."""
         for run in self._runs:

@@ -15,7 +15,8 @@ from uwbbench.api import SPEED_OF_LIGHT_M_S, Detections, Obstacle
 from uwbbench.config.rules import Table
 from uwbbench.measure.accuracy.causes import KINDS, NOT_KNOWN, Causes, causes
 from uwbbench.measure.accuracy.echoes import covered_m, excess_m, ghosts_m, window_m
-from uwbbench.measure.accuracy.judge import SCORINGS, Region, Scene, ScoringRules, judge
+from uwbbench.measure.accuracy.judge import SCORINGS, Scene, ScoringRules, judge
+from uwbbench.measure.accuracy.region import Region
 from uwbbench.measure.accuracy.scoring import tables_of
 
 FRAMES = 4

@@ -8,7 +8,9 @@ from hypothesis import strategies as st
 
 from tests.fixtures.chance import plausible
 from uwbbench.measure.accuracy.intervals import (
+    CORRELATION_S,
     INNER_UNITS,
+    Blocks,
     degrees,
     delete_one,
     exact,
@@ -62,11 +64,20 @@ def test_values_without_one_unit_are_those_of_the_others(seed, units):
 
 @settings(max_examples=50, deadline=None)
 @given(SEEDS, st.integers(INNER_UNITS, 40))
-def test_the_interval_of_a_mean_of_equal_units_is_that_of_student(seed, units):
-    values = np.random.default_rng(seed).normal(size=units)
-    found = mean(values, np.ones(units))
+def test_a_plain_mean_of_equal_units_has_the_interval_of_student(seed, units):
+    values, ones = np.random.default_rng(seed).normal(size=units), np.ones(units)
+    found = of_left_out(values.mean(), delete_one(values, ones), ones, units=units)
     expected = scipy.stats.ttest_1samp(values, 0).confidence_interval(0.95)
     assert (found.low, found.high) == pytest.approx((expected.low, expected.high))
+
+
+def test_a_mean_of_either_sign_is_a_share_of_the_way_between_its_bounds():
+    rng = np.random.default_rng(12)
+    den = rng.integers(5, 30, 15).astype(float)
+    num = den * rng.normal(0.1, 0.2, 15)
+    found, as_share = mean(num, den, most=2.0), share((num / 2.0 + den) / 2, den)
+    assert np.array(found) == pytest.approx(2.0 * (2 * np.array(as_share) - 1))
+    assert np.isnan(mean(num[:11], den[:11], most=2.0).low)
 
 
 @pytest.mark.parametrize(("hits", "trials"), [(0, 10), (3, 10), (10, 10), (999, 1000)])
@@ -113,18 +124,28 @@ def test_units_without_denominator_do_not_count():
 
 
 def test_nothing_is_undefined():
-    for found in (share([], []), share([0.0], [0.0]), ratio([0.0], [0.0]), mean([], []), quantile([], 0.5)):
+    for found in (share([], []), share([0.0], [0.0]), ratio([0.0], [0.0]), mean([], [], most=1.0), quantile([], 0.5)):
         assert np.isnan(np.array(found)).all()
 
 
-def test_a_share_of_one_has_the_outer_interval_at_any_number_of_units():
-    found = share([30.0] * 20, [30.0] * 20)
-    assert (found.low, found.high) == (pytest.approx(0.025 ** (1 / 20)), 1.0)
-
-
-def test_a_share_just_below_one_is_no_surer_than_one_of_exactly_one():
+def test_a_share_of_one_has_the_interval_of_one_just_below_it():
     all_found, one_missed = share([1000.0] * 20, [1000.0] * 20), share([999.0] + [1000.0] * 19, [1000.0] * 20)
-    assert one_missed.low < all_found.low + 0.05
+    assert all_found.high == 1.0
+    assert all_found.outer_low == pytest.approx(0.025 ** (1 / 20))
+    assert one_missed.low == pytest.approx(float(all_found.low), abs=0.01)
+
+
+def test_the_lower_end_leaves_room_for_half_a_scene_that_fails():
+    rng = np.random.default_rng(11)
+    num, den = 100 * rng.beta(95, 5, 30), np.full(30, 100.0)
+    low = float(share(num, den).low)
+    padded_num, padded_den = np.r_[num, 0.0], np.r_[den, 50.0]
+    left = delete_one(padded_num, padded_den)
+    logits = np.log(left / (1 - left))
+    middle = np.log(padded_num.sum() / (padded_den.sum() - padded_num.sum()))
+    error = np.sqrt(30 / 31 * np.square(logits - middle).sum())
+    expected = middle - error * scipy.stats.t.ppf(0.975, degrees(padded_den))
+    assert np.log(low / (1 - low)) == pytest.approx(expected)
 
 
 def test_many_numbers_at_once_are_those_one_by_one():
@@ -134,10 +155,26 @@ def test_many_numbers_at_once_are_those_one_by_one():
         assert np.array(together)[:, at] == pytest.approx(np.array(share(num, den)))
 
 
-def test_the_outer_interval_of_a_mean_error_lies_below_the_largest_error_that_was_seen():
+def test_a_mean_error_is_a_share_of_the_largest_error_that_was_seen():
+    rng = np.random.default_rng(13)
+    den = rng.integers(5, 30, 15).astype(float)
+    num = den * rng.gamma(2, 0.1, 15)
+    found, as_share = ratio(num, den, most=2.5), share(num / 2.5, den)
+    assert np.array(found) == pytest.approx(2.5 * np.array(as_share))
+
+
+def test_a_mean_error_of_few_scenes_has_no_upper_end():
     found = ratio([1.0, 2.0, 0.5], [10.0, 10.0, 10.0], most=0.9)
-    assert 0 < found.low < found.value < found.high < 0.9
-    assert np.isnan(ratio([1.0, 2.0, 0.5], [10.0, 10.0, 10.0]).high)
+    assert 0 < found.low < found.value
+    assert (found.high, found.outer_high) == (np.inf, np.inf)
+
+
+def test_a_rate_without_a_bound_has_the_interval_of_its_logarithm_from_twelve_scenes_on():
+    num, den = np.random.default_rng(14).gamma(2, 1, 12), np.ones(12)
+    found = ratio(num, den)
+    assert float(found.low * found.high) == pytest.approx(float(found.value) ** 2)
+    assert np.isnan(found.outer_low)
+    assert np.isnan(ratio(num[:11], den[:11]).high)
 
 
 @settings(max_examples=30, deadline=None)
@@ -163,16 +200,21 @@ def test_a_quantile_of_few_units_has_no_upper_end():
 
 def test_blocks_are_compared_with_those_of_their_own_capture_only():
     left = np.array([1.0, 1.1, 0.9, 1.0, 5.0, 5.2, 4.8, 5.0])
-    spread = stratified(left, 2)
+    spread = stratified(left, Blocks(2, 1e9))
     parts = [3 / 4 * np.square(row - row.mean()).sum() for row in left.reshape(2, 4)]
     assert spread.error == pytest.approx(np.sqrt(sum(parts)))
     assert spread.degrees == pytest.approx(sum(parts) ** 2 / (parts[0] ** 2 / 3 + parts[1] ** 2 / 3))
 
 
-def test_a_number_without_a_form_of_its_own_has_the_same_interval_from_the_same_values():
+def test_short_blocks_are_trusted_less():
+    left = np.array([1.0, 1.1, 0.9, 1.0])
+    long, short = stratified(left, Blocks(1, 1e9)), stratified(left, Blocks(1, 2.5))
+    assert short.error == pytest.approx(long.error * np.sqrt(1 + 2 * CORRELATION_S / 2.5))
+
+
+def test_a_number_without_a_form_of_its_own_needs_twelve_units_too():
     num, den = np.random.default_rng(7).normal(1, 0.2, 20), np.ones(20)
-    plain = of_left_out(num.mean(), delete_one(num, den), den, units=20)
-    assert np.array(plain[:3]) == pytest.approx(np.array(mean(num, den)[:3]))
+    assert np.isfinite(of_left_out(num.mean(), delete_one(num, den), den, units=12).low)
     assert np.isnan(of_left_out(num.mean(), delete_one(num, den), den, units=11).low)
 
 

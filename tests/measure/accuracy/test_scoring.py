@@ -10,9 +10,7 @@ import pytest
 from tests.measure.accuracy.scenes import GATE_M, RATE_HZ, WINDOW_M, capture_of, counts, found_in, post
 from uwbbench.api import Detections, Obstacle, ScoringError
 from uwbbench.api.capture import CaptureHeader
-from uwbbench.measure.accuracy.metrics.detection import Recall
 from uwbbench.measure.accuracy.scoring import SCORINGS, Region, ScoringRules, outcomes, score
-from uwbbench.measure.accuracy.stats import bootstrap
 
 # ---- which frames and objects count
 
@@ -297,7 +295,7 @@ def test_resampling_groups_last_a_second_or_more_and_are_the_same_for_all_detect
         assert inside[-1] - inside[0] + 1 / RATE_HZ >= 1.0
     late = outcomes(Detections.empty(np.arange(20, 37)), capture, ScoringRules())["filtering"]
     np.testing.assert_array_equal(late.group, everything.group[20:])
-    assert bootstrap(Recall, [everything]).groups == 3
+    assert len(np.unique(everything.group)) == 3
 
 
 # ---- what bad input gets

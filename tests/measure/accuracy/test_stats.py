@@ -11,18 +11,38 @@ from hypothesis import strategies as st
 
 from tests.fixtures.chance import SIGMAS, plausible
 from uwbbench.api.metric import Outcome
-from uwbbench.measure.accuracy.metrics.detection import FalseAlarmsPerMinute, Precision, Recall
-from uwbbench.measure.accuracy.metrics.error import Bias, MeanAbsoluteError, Percentile90
+from uwbbench.measure.accuracy.groups import blocks_of
+from uwbbench.measure.accuracy.intervals import degrees, share
+from uwbbench.measure.accuracy.metrics.detection import F1, FalseAlarmsPerMinute, Precision, Recall
+from uwbbench.measure.accuracy.metrics.error import (
+    Bias,
+    MeanAbsoluteError,
+    Percentile90,
+    Percentile95,
+    StandardDeviation,
+)
 from uwbbench.measure.accuracy.stats import (
-    MINIMUM_GROUPS,
-    bootstrap,
     clopper_pearson,
     clustered_proportion,
+    drawn,
+    estimated,
     evaluate,
-    holm,
+    paired_board,
     paired_difference,
     samples_needed,
 )
+
+SHIPPED = (
+    F1,
+    Precision,
+    Recall,
+    FalseAlarmsPerMinute,
+    MeanAbsoluteError,
+    Percentile90,
+    Percentile95,
+    StandardDeviation,
+)
+SHIPPED += (Bias,)
 
 
 def outcome(rng, frames=40, blocks=4, hit=0.8, offset_m=0.0, noise_m=0.05):
@@ -49,114 +69,99 @@ def test_value_is_that_of_all_frames_together_not_the_mean_of_captures():
     rng = np.random.default_rng(1)
     captures = [outcome(rng, 10, hit=0.0), outcome(rng, 90, hit=1.0)]
     assert evaluate(Recall, captures) == 0.9
-    assert bootstrap(Recall, captures).value == 0.9
+    assert estimated(Recall, captures).value == 0.9
 
 
-@settings(max_examples=20, deadline=None)
-@given(st.integers(0, 10_000), st.integers(1, 12))
-def test_blocks_of_a_capture_merge_to_the_whole_capture(seed, blocks):
-    one = outcome(np.random.default_rng(seed), frames=60, blocks=blocks)
-    estimate = bootstrap(Bias, [one], resamples=1)
-    each = bootstrap(Recall, [one], resamples=1).per_group
-    assert estimate.groups == blocks
-    assert estimate.value == pytest.approx(np.mean(one.error_m), nan_ok=True)
-    if each:
-        sizes = np.bincount(one.group)
-        assert np.dot(each, sizes) / sizes.sum() == pytest.approx(evaluate(Recall, [one]))
-
-
-def test_group_values_are_those_of_each_block_alone():
-    rng = np.random.default_rng(0)
-    one = outcome(rng, 40, blocks=4)
-    expected = [one.error_m[one.group[one.error_frame] == block].mean() for block in range(4)]
-    assert bootstrap(Bias, [one]).per_group == pytest.approx(expected)
-    assert bootstrap(FalseAlarmsPerMinute, [one]).per_group == (0.0,) * 4
-
-
-def test_captures_are_the_groups_from_eight_captures_on():
+def test_captures_of_one_scene_are_one_piece_of_evidence():
     rng = np.random.default_rng(2)
-    captures = [outcome(rng, blocks=5) for _ in range(8)]
-    assert bootstrap(Recall, captures, resamples=10).groups == 8
-    assert bootstrap(Recall, captures[:7], resamples=10).groups == 35
+    captures = [outcome(rng) for _ in range(24)]
+    scenes = [number // 2 for number in range(24)]
+    estimate = estimated(Recall, captures, scenes)
+    assert estimate.groups == 12
+    merged = [evaluate(Recall, captures[at : at + 2]) for at in range(0, 24, 2)]
+    found = share(40 * 2 * np.array(merged), np.full(12, 80.0))
+    assert (estimate.low, estimate.high) == pytest.approx((float(found.low), float(found.high)))
 
 
-def test_captures_without_scored_frames_are_no_groups():
+def test_captures_without_scored_frames_are_no_scenes():
     rng = np.random.default_rng(2)
     captures = [outcome(rng, blocks=1) for _ in range(7)] + [without_frames()]
-    assert bootstrap(Recall, captures, resamples=10).groups == 7
+    assert estimated(Recall, captures).groups == 7
 
 
-def test_below_eight_groups_there_is_no_interval_but_every_value():
-    estimate = bootstrap(Recall, [outcome(np.random.default_rng(3), blocks=MINIMUM_GROUPS - 1)])
-    assert math.isnan(estimate.low)
-    assert math.isnan(estimate.high)
-    assert len(estimate.per_group) == estimate.groups == MINIMUM_GROUPS - 1
+def test_below_twelve_scenes_there_is_the_outer_interval_and_every_value():
+    rng = np.random.default_rng(3)
+    captures = [outcome(rng) for _ in range(11)]
+    estimate = estimated(Recall, captures)
+    assert (estimate.low, estimate.high) == (estimate.outer_low, estimate.outer_high)
+    assert estimate.per_group == pytest.approx([one.tp.mean() for one in captures])
+    assert estimated(Recall, [*captures, outcome(rng)]).per_group == ()
+
+
+@pytest.mark.parametrize("count", [1, 2, 3])
+def test_up_to_three_scenes_have_an_interval_within_their_recordings(count):
+    rng = np.random.default_rng(4)
+    captures = [outcome(rng, frames=400, blocks=40) for _ in range(count)]
+    estimate = estimated(Recall, captures)
+    assert estimate.within
+    assert estimate.outer_low < estimate.low < estimate.value < estimate.high < estimate.outer_high
+    assert not estimated(Recall, [outcome(rng, frames=400, blocks=40) for _ in range(4)]).within
+
+
+def test_recordings_of_less_than_half_a_minute_together_have_no_interval_within_them():
+    rng = np.random.default_rng(5)
+    assert estimated(Recall, [outcome(rng, frames=100, blocks=10) for _ in range(3)]).within
+    short = estimated(Recall, [outcome(rng, frames=99, blocks=9) for _ in range(3)])
+    assert not short.within
+    assert (short.low, short.high) == (short.outer_low, short.outer_high)
 
 
 def test_no_outcome_at_all_is_an_undefined_number_of_no_samples():
     for given_outcomes in ([], [without_frames()]):
-        estimate = bootstrap(Recall, given_outcomes)
+        estimate = estimated(Recall, given_outcomes)
         assert math.isnan(estimate.value)
         assert (estimate.n, estimate.groups) == (0, 0)
 
 
-def test_interval_agrees_with_scipys_bootstrap_of_group_means():
-    rng = np.random.default_rng(4)
-    captures = [outcome(rng, frames=50, hit=rng.uniform(0.5, 1.0)) for _ in range(30)]
-    ours = bootstrap(Recall, captures, resamples=4000, seed=1)
-    recalls = np.array([one.tp.mean() for one in captures])
-    theirs = scipy.stats.bootstrap(
-        (recalls,), np.mean, n_resamples=4000, method="percentile", random_state=np.random.default_rng(2)
-    ).confidence_interval
-    # Standard error of a 2.5 % quantile of 4000 normal draws.
-    quantile_se = np.std(recalls) / np.sqrt(30) * np.sqrt(0.025 * 0.975 / 4000) / scipy.stats.norm.pdf(1.96)
-    assert ours.low == pytest.approx(theirs.low, abs=SIGMAS * np.sqrt(2) * quantile_se)
-    assert ours.high == pytest.approx(theirs.high, abs=SIGMAS * np.sqrt(2) * quantile_se)
+@pytest.mark.parametrize("metric", [metric for metric in SHIPPED if metric is not FalseAlarmsPerMinute])
+def test_every_shipped_metric_has_an_interval_around_its_value_from_twelve_scenes_on(metric):
+    rng = np.random.default_rng(6)
+    captures = [outcome(rng, hit=rng.uniform(0.6, 1.0), offset_m=rng.normal(0, 0.05)) for _ in range(40)]
+    estimate = estimated(metric, captures)
+    assert estimate.low <= estimate.value <= estimate.high
+    assert estimate.n > 0
 
 
-def test_interval_covers_the_true_value_about_as_often_as_it_says():
-    rng = np.random.default_rng(5)
-    hits = 0
-    for trial in range(150):
-        captures = [outcome(rng, frames=20, hit=0.7, blocks=1) for _ in range(25)]
-        estimate = bootstrap(Recall, captures, resamples=200, seed=trial)
-        hits += estimate.low <= 0.7 <= estimate.high
-    # A percentile interval of 25 groups covers slightly less than it says: 92 to 94 %.
-    assert hits >= plausible(0.92, 150)[0]
+def test_no_false_alarm_at_all_is_a_rate_without_an_interval():
+    rng = np.random.default_rng(6)
+    estimate = estimated(FalseAlarmsPerMinute, [outcome(rng) for _ in range(20)])
+    assert estimate.value == 0
+    assert math.isnan(estimate.high), "how many there may be elsewhere, no frame says"
 
 
-def test_same_seed_gives_the_same_interval():
-    one = outcome(np.random.default_rng(6), blocks=10)
-    assert bootstrap(Recall, [one], resamples=50, seed=3) == bootstrap(Recall, [one], resamples=50, seed=3)
-    assert bootstrap(Recall, [one], resamples=50, seed=3) != bootstrap(Recall, [one], resamples=50, seed=4)
+def test_a_metric_that_says_nothing_of_its_kind_has_the_interval_of_its_values_without_one_scene():
+    class Spread(StandardDeviation):
+        kind = "other"
 
-
-def test_groups_that_are_all_alike_give_an_interval_without_width():
-    captures = [outcome(np.random.default_rng(7), hit=1.0) for _ in range(9)]
-    estimate = bootstrap(MeanAbsoluteError, captures, resamples=50)
-    assert estimate.low == pytest.approx(estimate.value)
-    assert estimate.high == pytest.approx(estimate.value)
-    assert estimate.n == 9 * 40
-
-
-def test_an_interval_that_many_resamples_cannot_define_is_not_given():
-    # One capture of nine holds all the output: a third of the draws miss it.
-    rng = np.random.default_rng(8)
-    captures = [outcome(rng, hit=0.0) for _ in range(8)] + [outcome(rng, hit=1.0)]
-    estimate = bootstrap(Precision, captures, resamples=200)
-    assert estimate.value == 1.0
-    assert math.isnan(estimate.low)
+    rng = np.random.default_rng(7)
+    captures = [outcome(rng, noise_m=rng.uniform(0.02, 0.1)) for _ in range(15)]
+    left = np.array([Spread.value(np.concatenate([c.error_m for c in captures if c is not one])) for one in captures])
+    estimate = estimated(Spread, captures)
+    error = np.sqrt(14 / 15 * np.square(left - estimate.value).sum())
+    freedom = degrees(np.array([len(one.error_m) for one in captures], float))
+    reach = error * scipy.stats.t.ppf(0.975, freedom)
+    assert (estimate.low, estimate.high) == pytest.approx((estimate.value - reach, estimate.value + reach))
 
 
 def test_a_percentile_without_enough_samples_has_no_value_and_says_how_many_it_had():
-    estimate = bootstrap(Percentile90, [outcome(np.random.default_rng(9), frames=20, hit=1.0)])
+    estimate = estimated(Percentile90, [outcome(np.random.default_rng(9), frames=20, hit=1.0)])
     assert math.isnan(estimate.value)
     assert estimate.n == 20
 
 
 def test_paired_difference_of_a_detector_with_itself_is_nothing():
     captures = [outcome(np.random.default_rng(seed)) for seed in range(10)]
-    difference = paired_difference(Recall, captures, captures, resamples=100)
+    difference = paired_difference(Recall, captures, captures)
     assert (difference.value, difference.low, difference.high, difference.p_value) == (0.0, 0.0, 0.0, 1.0)
 
 
@@ -164,17 +169,29 @@ def test_pairing_sees_a_difference_smaller_than_the_spread_of_captures():
     rng = np.random.default_rng(10)
     first = [outcome(rng, hit=1.0, offset_m=offset) for offset in np.linspace(-0.5, 0.5, 12)]
     second = [dataclasses.replace(one, error_m=one.error_m - 0.01) for one in first]
-    difference = paired_difference(Bias, first, second, resamples=500)
+    difference = paired_difference(Bias, first, second)
     assert difference.value == pytest.approx(0.01)
     assert difference.low > 0
-    assert difference.p_value == pytest.approx(2 / 501)
-    alone = bootstrap(Bias, first, resamples=500)
+    assert difference.p_value == 2**-11, "no surer than twelve equal signs"
+    alone = estimated(Bias, first)
     assert difference.high - difference.low < 1e-6 < alone.high - alone.low
 
 
+@pytest.mark.parametrize("metric", SHIPPED)
+def test_a_board_holds_the_paired_differences_of_all_its_pairs(metric):
+    rng = np.random.default_rng(11)
+    series = [[outcome(rng, hit=hit) for _ in range(40)] for hit in (0.9, 0.8, 0.85)]
+    scenes = [number // 2 for number in range(40)]
+    for (one, other), found in paired_board(metric, series, scenes).items():
+        alone = paired_difference(metric, series[one], series[other], scenes)
+        assert (found.per_group, alone.per_group) == ((), ())
+        numbers = [np.array([value for key, value in vars(d).items() if key != "per_group"]) for d in (found, alone)]
+        assert numbers[0] == pytest.approx(numbers[1], nan_ok=True)
+
+
 def test_paired_difference_pairs_blocks_by_their_time_also_where_one_detector_left_some_out():
-    full = outcome(np.random.default_rng(11), frames=40, blocks=4, hit=1.0)
-    late = full.group >= 2
+    full = outcome(np.random.default_rng(11), frames=400, blocks=40, hit=1.0)
+    late = full.group >= 20
     half = dataclasses.replace(
         full,
         group=full.group[late],
@@ -185,8 +202,18 @@ def test_paired_difference_pairs_blocks_by_their_time_also_where_one_detector_le
         error_m=full.error_m[late[full.error_frame]],
         matched=np.ones(late.sum(), bool),
     )
-    difference = paired_difference(Bias, [full], [half])
-    assert difference.per_group == pytest.approx((math.nan, math.nan, 0.0, 0.0), nan_ok=True)
+    first, second = blocks_of([full, half])
+    assert [len(block.group) for block in first] == [100, 100, 100, 100]
+    assert [len(block.group) for block in second] == [0, 0, 100, 100]
+    assert np.array_equal(first[3].error_m, second[3].error_m)
+    assert paired_difference(Recall, [full], [half]).within
+
+
+def test_a_comparison_within_recordings_has_no_p_value():
+    rng = np.random.default_rng(12)
+    first, second = ([outcome(rng, frames=400, blocks=40, hit=hit) for _ in range(3)] for hit in (0.9, 0.6))
+    difference = paired_difference(Recall, first, second)
+    assert difference.low > 0
     assert math.isnan(difference.p_value)
 
 
@@ -199,27 +226,24 @@ def test_a_comparison_on_different_captures_is_refused():
 def test_p_values_of_equal_detectors_are_not_too_small():
     rng = np.random.default_rng(13)
     small = 0
-    for trial in range(100):
-        first, second = ([outcome(rng, frames=20, hit=0.7) for _ in range(20)] for _ in range(2))
-        small += paired_difference(Recall, first, second, resamples=150, seed=trial).p_value < 0.05
-    # A bootstrap of 20 groups says 0.05 of up to 0.08 of the draws.
-    assert small <= plausible(0.08, 100)[-1]
+    for _ in range(200):
+        first, second = ([outcome(rng, frames=20, hit=0.7) for _ in range(12)] for _ in range(2))
+        small += paired_difference(Recall, first, second).p_value < 0.05
+    assert small <= plausible(0.05, 200)[-1]
 
 
-@settings(max_examples=50, deadline=None)
-@given(st.lists(st.floats(0, 1), max_size=8))
-def test_holm_agrees_with_its_definition(values):
-    order = np.argsort(values, kind="stable")
-    expected = np.empty(len(values))
-    running = 0.0
-    for rank, index in enumerate(order):
-        running = max(running, (len(values) - rank) * values[index])
-        expected[index] = min(1.0, running)
-    np.testing.assert_allclose(holm(values), expected)
-
-
-def test_holm_leaves_out_comparisons_that_were_not_made():
-    np.testing.assert_allclose(holm([0.01, np.nan, 0.04]), [0.02, np.nan, 0.04])
+def test_drawn_values_spread_as_the_intervals_say():
+    rng = np.random.default_rng(14)
+    series = [[outcome(rng, hit=rng.uniform(0.6, 0.9)) for _ in range(20)] for _ in range(2)]
+    values = drawn(Recall, series, [], draws=4000, seed=1)
+    assert values.shape == (4000, 2)
+    for column, outcomes in zip(values.T, series, strict=True):
+        recalls = np.array([one.tp.mean() for one in outcomes])
+        error = recalls.std(ddof=1) / np.sqrt(20)
+        assert column.mean() == pytest.approx(recalls.mean(), abs=SIGMAS * error * 1.1 / np.sqrt(4000))
+        inside = np.count_nonzero(np.abs(column - recalls.mean()) < error * scipy.stats.t.ppf(0.975, 19))
+        assert inside in plausible(0.95, 4000)
+    assert len(drawn(Recall, [outcomes[:5] for outcomes in series], [], draws=10, seed=1)) == 0
 
 
 @settings(max_examples=50, deadline=None)

@@ -33,12 +33,14 @@ class Broken(Metric):
         return float(partial[0] / partial[1]) if partial[1] else math.nan
 '''
 VALUE = "return float(partial[0] / partial[1]) if partial[1] else math.nan"
-RESAMPLED = '''
+PARTS = '''
+
+    kind = "ratio"
 
     @classmethod
-    def resampled(cls, partials, counts):
+    def parts(cls, partial):
         """Wrong."""
-        return np.array([part[0] / part[1] for part in counts @ np.stack(partials)]) * 1.001
+        return float(partial[0]), float(partial[1]) * 1.001
 '''
 BROKEN = {
     "docstring-says-what-it-is": (("Mean absolute error.", "Mean absolute error"), "'Mean absolute error'"),
@@ -53,8 +55,8 @@ BROKEN = {
     ),
     "nothing-is-undefined": (("else math.nan", "else 0.0"), "0.0 with n"),
     "perfection-is-best": (('better = "lower"', 'better = "higher"'), "perfect 0"),
-    "interval-brackets-the-value": ((VALUE + "\n", VALUE + RESAMPLED.replace("1.001", "2")), " to "),
-    "resampling-is-the-same-number": ((VALUE + "\n", VALUE + RESAMPLED), "differences up to"),
+    "interval-brackets-the-value": ((VALUE + "\n", VALUE + PARTS.replace("1.001", "9")), " to "),
+    "kind-fits": ((VALUE + "\n", VALUE + PARTS), "from the parts of a ratio"),
     "errors-that-are-nan-are-left-out": (("[np.isfinite(outcome.error_m)]", ""), "nan"),
     "open-truth-is-fine": (
         ("        error_m =", "        1 / outcome.exhaustive\n        error_m ="),

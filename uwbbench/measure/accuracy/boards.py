@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from uwbbench.api.arrays import BoolArray, FloatArray, IntArray
-from uwbbench.measure.accuracy.intervals import INNER_UNITS, degrees, jackknife, stratified, student
+from uwbbench.measure.accuracy.intervals import INNER_UNITS, Blocks, degrees, jackknife, stratified, student
 
 RANKED_UNITS = 6
 """Fewer units than this rank nobody."""
@@ -55,7 +55,9 @@ class Contrast(NamedTuple):
         return self.value - reach, self.value + reach
 
 
-def contrast(value: ArrayLike, left: ArrayLike, weights: tuple[FloatArray, FloatArray], *, strata: int = 0) -> Contrast:
+def contrast(
+    value: ArrayLike, left: ArrayLike, weights: tuple[FloatArray, FloatArray], *, blocks: Blocks | None = None
+) -> Contrast:
     """Difference of two detectors on the same units.
 
     Parameters
@@ -66,8 +68,8 @@ def contrast(value: ArrayLike, left: ArrayLike, weights: tuple[FloatArray, Float
         The difference without each unit.
     weights : pair of (..., units) array
         What each unit weighs for either detector: the denominators of a ratio.
-    strata : int
-        Captures whose blocks the units are, in equal number and capture after capture; 0: the units are scenes.
+    blocks : Blocks, optional
+        The units are blocks of a few recordings; left out: they are scenes.
 
     Returns
     -------
@@ -76,8 +78,8 @@ def contrast(value: ArrayLike, left: ArrayLike, weights: tuple[FloatArray, Float
     """
     difference, without = np.asarray(value, float), np.asarray(left, float)
     together = weights[0] + weights[1]
-    if strata:
-        spread = stratified(without, strata)
+    if blocks is not None:
+        spread = stratified(without, blocks)
         freedom = spread.degrees
     else:
         spread = jackknife(difference, without, together)
@@ -91,37 +93,38 @@ def board(values: FloatArray, left: FloatArray, weights: FloatArray) -> Contrast
 
     Parameters
     ----------
-    values : (detectors,) array
+    values : (..., detectors) array
         Number of each detector.
-    left : (detectors, units) array
+    left : (..., detectors, units) array
         The same without each unit.
-    weights : (detectors, units) array
+    weights : (..., detectors, units) array
         What each unit weighs for each.
 
     Returns
     -------
     Contrast
-        Of (detectors, detectors) arrays, row minus column; NaN where a number is undefined.
+        Of (..., detectors, detectors) arrays, row minus column; NaN where a number is undefined.
     """
-    units = int(np.count_nonzero(weights.any(axis=0)))
-    off = np.where(weights > 0, left - values[:, None], 0.0)
-    inner = off @ off.T
-    own = np.diag(inner)
-    square = own[:, None] + own - 2 * inner
-    square = np.where(square > 1e-12 * (own[:, None] + own), square, 0.0)  # what is left of equal ones is rounding
-    error = np.sqrt(square * (units - 1) / max(units, 1))
+    units = np.count_nonzero(weights.any(axis=-2), axis=-1)[..., None, None]
+    off = np.where(weights > 0, left - values[..., None], 0.0)
+    inner = off @ np.swapaxes(off, -1, -2)
+    own = np.diagonal(inner, axis1=-2, axis2=-1)
+    both = own[..., :, None] + own[..., None, :]
+    square = both - 2 * inner
+    square = np.where(square > 1e-12 * both, square, 0.0)  # what is left of equal ones is rounding
+    error = np.sqrt(square * (units - 1) / np.maximum(units, 1))
     freedom = degrees(weights)
-    fewer = np.minimum(freedom[:, None], freedom)
-    difference = values[:, None] - values
+    fewer = np.minimum(freedom[..., :, None], freedom[..., None, :])
+    difference = values[..., :, None] - values[..., None, :]
     return Contrast(difference, error, fewer, _p_value(difference, error, fewer, units))
 
 
 def _p_value(difference: FloatArray, error: FloatArray, freedom: FloatArray, units: ArrayLike) -> FloatArray:
     from scipy.special import stdtr
 
-    spread = np.where(error > 0, error, 1.0)
+    varies = error > 1e-9 * np.abs(difference)  # less is what rounding leaves of the same difference in all units
     constant = np.where(difference == 0, 1.0, 2.0 ** (1 - np.asarray(units, float)))
-    p_value = np.where(error > 0, 2 * stdtr(freedom, -np.abs(difference) / spread), constant)
+    p_value = np.where(varies, 2 * stdtr(freedom, -np.abs(difference) / np.where(varies, error, 1.0)), constant)
     return np.where(np.isnan(difference) | np.isnan(error), np.nan, p_value)
 
 

@@ -176,7 +176,7 @@ def _near(detections: Detections, scene: Scene, rules: ScoringRules, table: Tabl
     """Which objects (n, objects) each detection is near to."""
     if not len(detections):
         return np.zeros((0, scene.labelled.shape[1]), bool)
-    return np.asarray(np.abs(scene.errors_m(detections, table)) <= rules.gate_m)
+    return np.asarray(np.abs(scene.errors_m(detections, table, rules.surface)) <= rules.gate_m)
 
 
 def _without_candidate(scene: Scene) -> IntArray:
@@ -192,7 +192,7 @@ def _kinds(verdict: Verdict, scene: Scene, rules: ScoringRules, table: Table) ->
     rows = verdict.retained.take(verdict.stray)
     if not len(rows):
         return Counter()
-    error_m = np.abs(scene.errors_m(rows, table))
+    error_m = np.abs(scene.errors_m(rows, table, rules.surface))
     near, seen = error_m <= rules.gate_m, scene.visible(rules.region)[rows.frame]
     radar = scene.header.radar
     way_m = excess_m(rows.range_m, rows.azimuth_rad, radar)

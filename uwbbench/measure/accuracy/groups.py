@@ -1,4 +1,4 @@
-"""What a bootstrap draws: captures, or blocks of captures where these are few."""
+"""Parts of an outcome: some of its frames, or blocks of a capture."""
 
 from __future__ import annotations
 
@@ -9,37 +9,40 @@ import numpy as np
 from uwbbench.api.arrays import IntArray
 from uwbbench.api.metric import Outcome
 
+BLOCKS = 4
+"""Blocks of a capture."""
 
-def groups_of(series: Sequence[Sequence[Outcome]], minimum: int) -> list[list[Outcome]]:
-    """Each detector's outcomes of every group; the groups are the same for all detectors.
+
+def blocks_of(capture: Sequence[Outcome]) -> list[list[Outcome]]:
+    """Each detector's outcomes of four blocks of a capture, which last equally long and are the same for all detectors.
 
     Parameters
     ----------
-    series : sequence of sequences of Outcome
-        One for each detector, and in it one for each capture, the captures in the same order.
-    minimum : int
-        Scored captures from which on each is a group; with fewer, their blocks are.
+    capture : sequence of Outcome
+        One for each detector, all of one capture.
+
+    Returns
+    -------
+    list of lists of Outcome
+        None where the capture is too short.
     """
-    scored = [captures for captures in zip(*series, strict=True) if any(len(outcome.group) for outcome in captures)]
-    if len(scored) >= minimum:
-        return [[captures[number] for captures in scored] for number in range(len(series))]
-    parts: list[list[Outcome]] = [[] for _ in series]
-    for captures in scored:
-        blocks = np.unique(np.concatenate([outcome.group for outcome in captures]))
-        for into, outcome in zip(parts, captures, strict=True):
-            into += _split(outcome, blocks)
-    return parts
+    seconds = np.unique(np.concatenate([outcome.group for outcome in capture]))
+    if len(seconds) < BLOCKS:
+        return []
+    ends = np.array([part[-1] for part in np.array_split(seconds, BLOCKS)])
+    return [_split(outcome, ends) for outcome in capture]
 
 
-def _split(outcome: Outcome, blocks: IntArray) -> list[Outcome]:
-    """Parts of one outcome, one for each of the given blocks."""
-    frames = _members(outcome.group, blocks)
-    errors = _members(outcome.group[outcome.error_frame], blocks)
+def _split(outcome: Outcome, ends: IntArray) -> list[Outcome]:
+    """Parts of one outcome, each up to the given second."""
+    block = np.searchsorted(ends, outcome.group)
+    error_block = block[outcome.error_frame]
     position = np.empty(len(outcome.group), np.int64)
     parts = []
-    for rows, error_rows in zip(frames, errors, strict=True):
+    for number in range(len(ends)):
+        rows = np.flatnonzero(block == number)
         position[rows] = np.arange(len(rows))
-        parts.append(taken(outcome, rows, error_rows, position))
+        parts.append(taken(outcome, rows, np.flatnonzero(error_block == number), position))
     return parts
 
 
@@ -67,11 +70,3 @@ def taken(outcome: Outcome, rows: IntArray, error_rows: IntArray, position: IntA
         duration_s=outcome.duration_s * len(rows) / len(outcome.group) if len(rows) else 0.0,
         exhaustive=outcome.exhaustive,
     )
-
-
-def _members(group: IntArray, blocks: IntArray) -> list[IntArray]:
-    """Positions of each block's entries in ``group``, in order."""
-    order = np.argsort(group, kind="stable")
-    starts = np.searchsorted(group[order], blocks, side="left")
-    ends = np.searchsorted(group[order], blocks, side="right")
-    return [order[start:end] for start, end in zip(starts, ends, strict=True)]

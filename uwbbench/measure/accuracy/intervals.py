@@ -10,11 +10,13 @@ Conventions
   each unit were a single trial that ends all or nothing, with Kish's effective number of trials for units of unequal
   size (Survey Sampling, 1965, section 11.7). No share with the same mean varies more between units.
 * The **inner** interval is given from :data:`INNER_UNITS` units on: value +- t x standard error of the jackknife that
-  leaves out one unit (Miller, Biometrika 61, 1974), on a scale on which it is nearly symmetric, never beyond the outer.
-  The degrees of freedom are Satterthwaite's (Bell and McCaffrey, Survey Methodology 28, 2002): below units - 1 where a
-  few long units make most of the number. It describes scenes like those that were seen: of a failure that none of them
-  holds it knows nothing, and :func:`failing_share` says how many such scenes there may be.
-* Blocks of one to three captures (``strata``) describe these recordings only: the jackknife is stratified by capture.
+  leaves out one unit (Miller, Biometrika 61, 1974), on the logit scale. The degrees of freedom are Satterthwaite's
+  (Bell and McCaffrey, Survey Methodology 28, 2002): below units - 1 where a few long units make most of it. Its lower
+  end is that with half a unit more that fails altogether, its upper end that with half a unit more in which all is
+  right, as scenes that fail are often rare, and then none is among a dozen. It is never wider than the outer one.
+* A mean error is taken as a share of the largest error that was seen: no data bound what lies beyond that. So it has an
+  upper end from :data:`INNER_UNITS` units on only.
+* :class:`Blocks` of one to three captures describe these recordings only: the jackknife is stratified by capture.
 * Undefined is NaN, also an end that cannot be given; inf is an end that the data do not reach.
 """
 
@@ -32,6 +34,12 @@ CONFIDENCE = 0.95
 
 INNER_UNITS = 12
 """Fewer units than this have the outer interval only."""
+
+LEVELS = 64
+"""Values that are tried on either side of a quantile; ends are rounded outwards to one of them."""
+
+CORRELATION_S = 3.0
+"""Time over which single frames of a recording may be correlated."""
 
 CLIPPED = 1e-6
 """Shares nearer to 0 or 1 than this are taken as this near, so that their logit is finite."""
@@ -58,6 +66,20 @@ class Interval(NamedTuple):
     outer_high: FloatArray
 
 
+class Blocks(NamedTuple):
+    """Blocks of a few recordings, in equal number for each and recording after recording.
+
+    Attributes
+    ----------
+    captures : int
+    seconds : float
+        Length of a block, in the shortest recording.
+    """
+
+    captures: int
+    seconds: float
+
+
 class Spread(NamedTuple):
     """Standard error and its degrees of freedom; NaN where a single unit carries the number."""
 
@@ -65,7 +87,7 @@ class Spread(NamedTuple):
     degrees: FloatArray
 
 
-def share(num: ArrayLike, den: ArrayLike, *, confidence: float = CONFIDENCE, strata: int = 0) -> Interval:
+def share(num: ArrayLike, den: ArrayLike, *, confidence: float = CONFIDENCE, blocks: Blocks | None = None) -> Interval:
     """Interval of a share, such as recall, precision or F1, on the logit scale.
 
     Parameters
@@ -73,8 +95,8 @@ def share(num: ArrayLike, den: ArrayLike, *, confidence: float = CONFIDENCE, str
     num, den : (..., units) array
         What each unit adds to the numerator, which is never more than what it adds to the denominator.
     confidence : float
-    strata : int
-        Captures whose blocks the units are, in equal number and capture after capture; 0: the units are scenes.
+    blocks : Blocks, optional
+        The units are blocks of a few recordings; left out: they are scenes.
 
     Returns
     -------
@@ -86,34 +108,64 @@ def share(num: ArrayLike, den: ArrayLike, *, confidence: float = CONFIDENCE, str
     >>> [round(float(end), 3) for end in (found.value, found.low, found.high)]
     [0.912, 0.315, 1.0]
     """
-    return _of_ratio(np.asarray(num, float), np.asarray(den, float), "logit", (0.0, 1.0), confidence, strata)
+    n, d = np.asarray(num, float), np.asarray(den, float)
+    value = _ratio(n, d)
+    outer_low, outer_high = exact(value, effective(d), confidence)
+    ends = [_student_ends(n, d, "logit", confidence, blocks)]
+    if blocks is None:
+        half = d.sum(-1, keepdims=True) / np.maximum(2 * np.count_nonzero(d, axis=-1, keepdims=True), 1)
+        more = np.concatenate([d, half], axis=-1)
+        ends += [
+            _student_ends(np.concatenate([n, part], -1), more, "logit", confidence, None) for part in (0 * half, half)
+        ]
+    low = np.fmax(np.fmin.reduce([value, *(low for low, _ in ends)]), outer_low)
+    high = np.fmin(np.fmax.reduce([value, *(high for _, high in ends)]), outer_high)
+    inner = (np.count_nonzero(d, axis=-1) >= INNER_UNITS) | (blocks is not None)
+    return Interval(value, np.where(inner, low, outer_low), np.where(inner, high, outer_high), outer_low, outer_high)
 
 
 def ratio(
-    num: ArrayLike, den: ArrayLike, *, most: ArrayLike = np.nan, confidence: float = CONFIDENCE, strata: int = 0
+    num: ArrayLike,
+    den: ArrayLike,
+    *,
+    most: ArrayLike = np.nan,
+    confidence: float = CONFIDENCE,
+    blocks: Blocks | None = None,
 ) -> Interval:
-    """Interval of a ratio that is never negative, such as a mean absolute error or a rate, on the log scale.
+    """Interval of a ratio that is never negative, such as a mean absolute error or a rate.
 
     Parameters
     ----------
     num, den : (..., units) array
         What each unit adds to the numerator and to the denominator.
     most : array
-        Largest value that a unit can have, for the outer interval: of a mean error, the largest error that was seen.
-        NaN: no bound is known, and there is no outer interval.
+        Largest value that a unit can have: of a mean error, the largest error that was seen. NaN: no bound is known;
+        the inner interval is then that of the logarithm, and there is no outer one.
     confidence : float
-    strata : int
+    blocks : Blocks, optional
         As in :func:`share`.
 
     Returns
     -------
     Interval
     """
-    return _of_ratio(np.asarray(num, float), np.asarray(den, float), "log", (0.0, most), confidence, strata)
+    n, d, bound = np.asarray(num, float), np.asarray(den, float), np.asarray(most, float)
+    if np.isnan(bound).all():
+        low, high = _student_ends(n, d, "log", confidence, blocks)
+        enough = (np.count_nonzero(d, axis=-1) >= INNER_UNITS) | (blocks is not None)
+        none = np.full_like(low, np.nan)
+        return Interval(_ratio(n, d), np.where(enough, low, np.nan), np.where(enough, high, np.nan), none, none)
+    scale = np.where(bound > 0, bound, 1.0)
+    value, low, high, outer_low, outer_high = (
+        bound * part for part in share(n / scale[..., None], d, confidence=confidence, blocks=blocks)
+    )
+    few = np.count_nonzero(d, axis=-1) < INNER_UNITS
+    outer_high = np.where(few & ~np.isnan(value), np.inf, outer_high)
+    return Interval(value, low, high if blocks else np.where(few, outer_high, high), outer_low, outer_high)
 
 
 def mean(
-    num: ArrayLike, den: ArrayLike, *, most: ArrayLike = np.nan, confidence: float = CONFIDENCE, strata: int = 0
+    num: ArrayLike, den: ArrayLike, *, most: ArrayLike, confidence: float = CONFIDENCE, blocks: Blocks | None = None
 ) -> Interval:
     """Interval of a mean of either sign, such as a bias.
 
@@ -122,24 +174,29 @@ def mean(
     num, den : (..., units) array
         Sum and number of the values of each unit.
     most : array
-        Largest magnitude that a value can have, for the outer interval; NaN: not known.
+        Largest magnitude of these values.
     confidence : float
-    strata : int
+    blocks : Blocks, optional
         As in :func:`share`.
 
     Returns
     -------
     Interval
     """
-    bounds = (-np.asarray(most, float), most)
-    return _of_ratio(np.asarray(num, float), np.asarray(den, float), "plain", bounds, confidence, strata)
+    n, d, bound = np.asarray(num, float), np.asarray(den, float), np.asarray(most, float)
+    scale = np.where(bound > 0, bound, 1.0)
+    above = (n / scale[..., None] + d) / 2  # a mean in -most...most is a share of the way between them
+    found = [scale * (2 * part - 1) for part in share(above, d, confidence=confidence, blocks=blocks)]
+    few = (np.count_nonzero(d, axis=-1) < INNER_UNITS) & (blocks is None)
+    return Interval(found[0], *(np.where(few, np.nan, end) for end in found[1:]))
 
 
-def quantile(samples: Sequence[FloatArray], q: float, *, confidence: float = CONFIDENCE, strata: int = 0) -> Interval:
-    """Interval of a quantile: that of the share of samples below it, mapped back (Woodruff, JASA 47, 1952).
+def quantile(
+    samples: Sequence[FloatArray], q: float, *, confidence: float = CONFIDENCE, blocks: Blocks | None = None
+) -> Interval:
+    """Interval of a quantile: all values below which the share of samples may be ``q`` (Woodruff, JASA 47, 1952).
 
-    The share's interval is that of Clopper and Pearson with as many trials as give its standard error (Korn and
-    Graubard, Survey Methodology 24, 1998), with t in place of the normal quantile.
+    A value is inside if ``q`` is in the interval of the share of samples up to it.
 
     Parameters
     ----------
@@ -148,7 +205,7 @@ def quantile(samples: Sequence[FloatArray], q: float, *, confidence: float = CON
     q : float
         Which quantile, 0...1; linear between order statistics.
     confidence : float
-    strata : int
+    blocks : Blocks, optional
         As in :func:`share`.
 
     Returns
@@ -156,22 +213,21 @@ def quantile(samples: Sequence[FloatArray], q: float, *, confidence: float = CON
     Interval
         With an upper end of inf where it lies beyond the largest sample.
     """
-    held = [np.asarray(part, float) for part in samples]
+    held = [np.sort(np.asarray(part, float)) for part in samples]
     every = np.sort(np.concatenate([*held, np.empty(0)]))
     if not len(every):
         return Interval(*np.full(5, np.nan))
+    levels = np.concatenate([q * np.linspace(0, 1, LEVELS, endpoint=False), q + (1 - q) * np.linspace(0, 1, LEVELS)])
+    tried = every[np.unique(np.round(levels * (len(every) - 1)).astype(int))]
+    below = np.array([np.searchsorted(part, tried, side="right") for part in held], float).T
+    size = np.broadcast_to(np.array([len(part) for part in held], float), below.shape)
+    found = share(below, size, confidence=confidence, blocks=blocks)
     value = np.quantile(every, q)
-    size = np.array([len(part) for part in held], float)
-    below = np.array([np.count_nonzero(part <= value) for part in held], float)
-    ends = [_mapped(every, end) for end in exact(np.asarray(q), effective(size), confidence)]
-    spread = _spread(below.sum() / size.sum(), delete_one(below, size), size, strata)
-    inner = ends
-    if (strata or np.count_nonzero(size) >= INNER_UNITS) and spread.error > 0:
-        wide = student(spread.degrees, confidence) / _normal(confidence)
-        trials = np.minimum(q * (1 - q) / np.square(spread.error * wide), size.sum())
-        low, high = (_mapped(every, end) for end in exact(np.asarray(q), trials, confidence))
-        inner = [np.maximum(low, ends[0]), np.minimum(high, ends[1])]
-    return Interval(np.asarray(value), *inner, *ends)
+    ends = []
+    for low, high in ((found.low, found.high), (found.outer_low, found.outer_high)):
+        under, over = tried[high < q], tried[low > q]
+        ends += [under.max(initial=every[0]), over.min() if len(over) else np.inf]
+    return Interval(value, *(np.asarray(end) for end in ends))
 
 
 def of_left_out(
@@ -182,7 +238,7 @@ def of_left_out(
     units: int,
     scale: Scale = "plain",
     confidence: float = CONFIDENCE,
-    strata: int = 0,
+    blocks: Blocks | None = None,
 ) -> Interval:
     """Interval of any number from its values without one part of the data at a time; there is no outer interval.
 
@@ -198,7 +254,7 @@ def of_left_out(
     scale : {"logit", "log", "plain"}
         On which the interval is symmetric.
     confidence : float
-    strata : int
+    blocks : Blocks, optional
         As in :func:`share`.
 
     Returns
@@ -207,8 +263,8 @@ def of_left_out(
     """
     centre = np.asarray(value, float)
     middle = _scaled(centre, scale)
-    spread = _spread(middle, _scaled(np.asarray(left, float), scale), np.asarray(weights, float), strata)
-    enough = units >= INNER_UNITS or strata
+    spread = _spread(middle, _scaled(np.asarray(left, float), scale), np.asarray(weights, float), blocks)
+    enough = units >= INNER_UNITS or blocks is not None
     reach = spread.error * student(spread.degrees, confidence) if enough else np.full_like(middle, np.nan)
     none = np.full_like(middle, np.nan)
     return Interval(centre, _unscaled(middle - reach, scale), _unscaled(middle + reach, scale), none, none)
@@ -278,18 +334,20 @@ def jackknife(value: FloatArray, left: FloatArray, weights: FloatArray) -> Sprea
     return Spread(np.where(units > 1, error, np.nan), degrees(weights))
 
 
-def stratified(left: FloatArray, strata: int) -> Spread:
+def stratified(left: FloatArray, blocks: Blocks) -> Spread:
     """Standard error from values without one block at a time, blocks being compared with others of their capture only.
 
-    Degrees of freedom after Satterthwaite (Biometrics Bulletin 2, 1946), over the captures.
+    Degrees of freedom after Satterthwaite (Biometrics Bulletin 2, 1946), over the captures. Neighbouring blocks are
+    alike, which hides part of the spread: the variance is widened by ``1 + 2 s / b``, with blocks of b seconds and
+    frames that are correlated over s = :data:`CORRELATION_S`.
     """
-    cells = left.reshape(*left.shape[:-1], strata, -1)
-    blocks = cells.shape[-1]
+    cells = left.reshape(*left.shape[:-1], blocks.captures, -1)
+    count = cells.shape[-1]
     off = cells - cells.mean(-1, keepdims=True)
-    parts = (blocks - 1) / blocks * np.square(off).sum(-1)
+    parts = (count - 1) / count * np.square(off).sum(-1)
     total, squares = parts.sum(-1), np.square(parts).sum(-1)
-    freedom = np.where(squares > 0, np.square(total) * (blocks - 1) / np.where(squares > 0, squares, 1.0), 1.0)
-    return Spread(np.sqrt(total), freedom)
+    freedom = np.where(squares > 0, np.square(total) * (count - 1) / np.where(squares > 0, squares, 1.0), 1.0)
+    return Spread(np.sqrt(total * (1 + 2 * CORRELATION_S / blocks.seconds)), freedom)
 
 
 def exact(value: FloatArray, trials: FloatArray, confidence: float = CONFIDENCE) -> tuple[FloatArray, FloatArray]:
@@ -313,41 +371,23 @@ def student(freedom: FloatArray, confidence: float = CONFIDENCE) -> FloatArray:
     return np.asarray(stdtrit(freedom, (1 + confidence) / 2))
 
 
-def _normal(confidence: float) -> float:
-    from scipy.special import ndtri
-
-    return float(ndtri((1 + confidence) / 2))
+def _spread(value: FloatArray, left: FloatArray, weights: FloatArray, blocks: Blocks | None) -> Spread:
+    return stratified(left, blocks) if blocks else jackknife(value, left, weights)
 
 
-def _spread(value: FloatArray, left: FloatArray, weights: FloatArray, strata: int) -> Spread:
-    return stratified(left, strata) if strata else jackknife(value, left, weights)
-
-
-def _of_ratio(
-    num: FloatArray,
-    den: FloatArray,
-    scale: Scale,
-    bounds: tuple[ArrayLike, ArrayLike],
-    confidence: float,
-    strata: int,
-) -> Interval:
-    """Interval of a ratio of sums: the outer one between the bounds of a unit's value, the inner one on a scale."""
+def _ratio(num: FloatArray, den: FloatArray) -> FloatArray:
     total = den.sum(-1)
-    value = np.where(total > 0, num.sum(-1) / np.where(total > 0, total, 1.0), np.nan)
-    least, most = (np.asarray(end, float) for end in bounds)
-    width = np.where(most > least, most - least, 1.0)
-    ends = [least + width * end for end in exact((value - least) / width, effective(den), confidence)]
-    outer_low, outer_high = (np.where(np.isnan(most), np.nan, end) for end in ends)
-    spread = _spread(_scaled(value, scale), _scaled(delete_one(num, den), scale), den, strata)
-    reach = spread.error * student(spread.degrees, confidence)
-    middle = _scaled(value, scale)
-    low = np.fmax(_unscaled(middle - reach, scale), outer_low)
-    high = np.fmin(_unscaled(middle + reach, scale), outer_high)
-    enough = (np.count_nonzero(den, axis=-1) >= INNER_UNITS) | bool(strata)
-    inner = enough & np.isfinite(middle) & (spread.error > 1e-9)
-    if scale == "logit":
-        inner &= (value > 0) & (value < 1)
-    return Interval(value, np.where(inner, low, outer_low), np.where(inner, high, outer_high), outer_low, outer_high)
+    return np.where(total > 0, num.sum(-1) / np.where(total > 0, total, 1.0), np.nan)
+
+
+def _student_ends(
+    num: FloatArray, den: FloatArray, scale: Scale, confidence: float, blocks: Blocks | None
+) -> tuple[FloatArray, FloatArray]:
+    """Ends of Student's interval of a ratio of sums on a scale; NaN where nothing varies."""
+    middle = _scaled(_ratio(num, den), scale)
+    spread = _spread(middle, _scaled(delete_one(num, den), scale), den, blocks)
+    reach = np.where(spread.error > 1e-9, spread.error * student(spread.degrees, confidence), np.nan)
+    return _unscaled(middle - reach, scale), _unscaled(middle + reach, scale)
 
 
 def _scaled(value: FloatArray, scale: Scale) -> FloatArray:
@@ -363,10 +403,3 @@ def _unscaled(value: FloatArray, scale: Scale) -> FloatArray:
     if scale == "logit":
         return 1 / (1 + np.exp(-np.clip(value, -700, 700)))
     return np.exp(np.clip(value, -700, 700)) if scale == "log" else value
-
-
-def _mapped(every: FloatArray, end: FloatArray) -> FloatArray:
-    """Quantile of sorted samples at the end of a share's interval; inf beyond the largest."""
-    if end >= 1 - 1 / len(every):
-        return np.asarray(np.inf)
-    return np.asarray(np.quantile(every, end))

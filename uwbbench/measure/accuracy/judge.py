@@ -4,7 +4,8 @@ Conventions
 -----------
 * Two tables. *Filtering*: the error of a detection is its range minus the true range from the receiver to the nearest
   point of the outline, as if the target were at boresight. *Mapping*: only detections that belong to a cluster count,
-  and the error is the distance from (x, y) to the outline, 0 inside it; a distance has no sign.
+  and the error is the distance from (x, y) to the outline, 0 inside it, or, for ``surface: visible``, to what the
+  receiver can see of it from where it is in that frame; a distance has no sign.
 * A frame is scored if a detector has processed it and its truth is known: every object labelled there, or, where the
   truth is not exhaustive, at least one obstacle. Invalid frames are not processed, so they drop out.
 * An obstacle is visible if its nearest point lies in the :class:`Region` and nothing occludes it. Structure (walls) is
@@ -37,64 +38,17 @@ from uwbbench.api.arrays import BoolArray, FloatArray, IntArray
 from uwbbench.api.capture import CaptureHeader
 from uwbbench.api.detections import Detections
 from uwbbench.api.errors import ScoringError, nearest
+from uwbbench.api.geometry import receiver_pose
 from uwbbench.api.metric import Outcome
-from uwbbench.api.radar import Radar
 from uwbbench.api.truth import Sight, Truth
-from uwbbench.config.rules import Scoring, Table
+from uwbbench.config.rules import Scoring, Surface, Table
 from uwbbench.measure.accuracy.matching import match_frames
+from uwbbench.measure.accuracy.region import Region
 
 SCORINGS: tuple[Scoring, ...] = get_args(Scoring)
 
 BLOCK_S = 1.0
 """Shortest resampling block within a capture."""
-
-
-@dataclass(frozen=True)
-class Region:
-    """Where a detector is asked to find obstacles, seen from the receiver.
-
-    Parameters
-    ----------
-    min_range_m : float
-        Radius of the blind zone, 0.6 m for the paper's radar.
-    max_range_m : float or None
-        None: as far as the radar's taps reach.
-    half_angle_rad : float or None
-        Largest azimuth to either side of boresight. None: 45 degrees for a radar with two antennas, which can measure
-        the angle, else 90 degrees.
-
-    Raises
-    ------
-    ScoringError
-        If the region is empty.
-    """
-
-    min_range_m: float = 0.6
-    max_range_m: float | None = None
-    half_angle_rad: float | None = None
-
-    def __post_init__(self) -> None:
-        if not 0 <= self.min_range_m < math.inf:
-            raise ScoringError(f"region: min_range_m must be at least 0 m, not {self.min_range_m}")
-        if self.max_range_m is not None and not self.min_range_m < self.max_range_m:
-            raise ScoringError(f"region: max_range_m {self.max_range_m} must exceed min_range_m {self.min_range_m}")
-        if self.half_angle_rad is not None and not 0 < self.half_angle_rad <= math.pi:
-            raise ScoringError(f"region: half_angle_rad must lie in (0, pi], not {self.half_angle_rad}")
-
-    def limits_m(self, radar: Radar) -> tuple[float, float]:
-        """Smallest and largest range for a radar."""
-        farthest = radar.window_m if self.max_range_m is None else self.max_range_m
-        if not self.min_range_m < farthest:
-            raise ScoringError(
-                f"region: the radar's window ends at {farthest:.3g} m, min_range_m is {self.min_range_m}"
-            )
-        return self.min_range_m, farthest
-
-    def widest_rad(self, radar: Radar) -> float:
-        """Largest azimuth for a radar."""
-        if self.half_angle_rad is not None:
-            return self.half_angle_rad
-        return math.pi / 4 if radar.has_sts else math.pi / 2
 
 
 @dataclass(frozen=True)
@@ -109,6 +63,8 @@ class ScoringRules:
     region : Region
     strongest : int or None
         Score only that many detections of a frame, those of largest amplitude in the region.
+    surface : {"outline", "visible"}
+        What the error of a position is the distance to: the outline, 0 inside, or what the receiver sees of it.
 
     Raises
     ------
@@ -120,8 +76,11 @@ class ScoringRules:
     gate_m: float = 0.20
     region: Region = field(default_factory=Region)
     strongest: int | None = None
+    surface: Surface = "outline"
 
     def __post_init__(self) -> None:
+        if self.surface not in get_args(Surface):
+            raise ScoringError(f"no surface '{self.surface}'.{nearest(self.surface, get_args(Surface))}")
         if self.scoring not in SCORINGS:
             raise ScoringError(f"no scoring '{self.scoring}'.{nearest(self.scoring, SCORINGS)}")
         if not 0 < self.gate_m < math.inf:
@@ -197,13 +156,25 @@ class Scene:
         ahead = np.abs(self.sight.azimuth_rad) <= region.widest_rad(self.header.radar)
         return self.inside(region) & ahead & ~self.sight.occluded & self.obstacle & self.labelled
 
-    def errors_m(self, detections: Detections, table: Table) -> FloatArray:
-        """Error (n, objects) of each detection against each object; NaN where the object is not labelled."""
+    def errors_m(self, detections: Detections, table: Table, surface: Surface = "outline") -> FloatArray:
+        """Error (n, objects) of each detection against each object; NaN where the object is not labelled.
+
+        Parameters
+        ----------
+        detections : Detections
+        table : {"filtering", "mapping"}
+        surface : {"outline", "visible"}
+            What distances of the mapping table are taken to.
+        """
         if table == "filtering":
             error = detections.range_m[:, None] - self.sight.range_m[detections.frame]
         else:
             points_m = np.stack([detections["x_m"], detections["y_m"]], axis=1)
-            error = self.truth.distance_to(points_m, detections.frame)
+            radar, track = self.header.radar, self.header.trajectory
+            mount_m = np.asarray(radar.mount_position_m)
+            receiver_m, _ = receiver_pose(track.position_m, track.yaw_rad, mount_m, radar.mount_yaw_rad)
+            eyes_m = receiver_m[detections.frame, :2] if surface == "visible" else None
+            error = self.truth.distance_to(points_m, detections.frame, eyes_m)
         return np.where(self.labelled[detections.frame], error, np.nan)
 
     def group(self) -> IntArray:
@@ -266,7 +237,7 @@ def judge(detections: Detections, scene: Scene, rules: ScoringRules, table: Tabl
     visible = scene.visible(rules.region)
     clustered = detections.take(detections["cluster"] >= 0) if table == "mapping" else detections
     kept = _strongest(_in_region(clustered, scene, rules, table), rules)
-    error_m = scene.errors_m(kept, table)
+    error_m = scene.errors_m(kept, table, rules.surface)
     near = np.abs(error_m) <= rules.gate_m
     seen = visible[kept.frame]
 
@@ -330,7 +301,7 @@ def _in_region(detections: Detections, scene: Scene, rules: ScoringRules, table:
     """Detections of scored frames in the region: those near labelled objects share their objects' place."""
     detections = detections.take(scene.scored[detections.frame])
     low, high = rules.region.limits_m(scene.header.radar)
-    near = np.abs(scene.errors_m(detections, table)) <= rules.gate_m
+    near = np.abs(scene.errors_m(detections, table, rules.surface)) <= rules.gate_m
     beside = (near & scene.inside(rules.region)[detections.frame]).any(axis=1)
     alone = (detections.range_m >= low) & (detections.range_m <= high)
     return detections.take(np.where(near.any(axis=1), beside, alone))
@@ -365,7 +336,7 @@ def _has_true_candidate(detections: Detections, scene: Scene, rules: ScoringRule
     needed = "range_m" if table == "filtering" else "x_m"
     if len(candidates) and needed not in candidates:
         raise ScoringError(f"peak scoring: the peaks before the filters have no {needed}")
-    near = np.abs(scene.errors_m(candidates, table)) <= rules.gate_m
+    near = np.abs(scene.errors_m(candidates, table, rules.surface)) <= rules.gate_m
     true = (near & scene.visible(rules.region)[candidates.frame]).any(axis=1)
     return np.isin(np.arange(len(scene.header)), candidates.frame[true])
 

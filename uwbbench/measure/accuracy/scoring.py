@@ -17,8 +17,8 @@ from uwbbench.api.capture import CaptureHeader
 from uwbbench.api.detections import Detections
 from uwbbench.api.errors import nearest
 from uwbbench.api.metric import Outcome
-from uwbbench.config.rules import Scoring, Table
-from uwbbench.measure.accuracy.judge import SCORINGS, Region, Scene, ScoringRules, Verdict, judge
+from uwbbench.config.rules import Scoring, Surface, Table
+from uwbbench.measure.accuracy.judge import SCORINGS, Scene, ScoringRules, Verdict, judge
 from uwbbench.measure.accuracy.metrics.detection import F1, FalseAlarmsPerMinute, Precision, Recall
 from uwbbench.measure.accuracy.metrics.error import (
     Bias,
@@ -28,6 +28,7 @@ from uwbbench.measure.accuracy.metrics.error import (
     StandardDeviation,
     matched_only,
 )
+from uwbbench.measure.accuracy.region import Region
 from uwbbench.measure.accuracy.stats import evaluate
 
 __all__ = ["SCORINGS", "Region", "ScoreBlock", "Scores", "Scoring", "ScoringRules", "outcomes", "score", "tables_of"]
@@ -154,6 +155,7 @@ def score(
     gate_m: float = 0.20,
     region: Region | None = None,
     strongest: int | None = None,
+    surface: Surface = "outline",
 ) -> Scores:
     """Score detections against the ground truth of their capture.
 
@@ -169,6 +171,8 @@ def score(
     region : Region, optional
     strongest : int, optional
         Score only that many detections of a frame.
+    surface : {"outline", "visible"}
+        What the error of a position is the distance to: the outline, 0 inside, or what the receiver sees of it.
 
     Returns
     -------
@@ -180,7 +184,8 @@ def score(
         If the capture has no truth, the detections are of another capture or lack a range, ``peak`` is asked for and
         the peaks before the filters are not known, or a parameter is not allowed.
     """
-    return score_scene(found, Scene.of(found, capture), ScoringRules(scoring, gate_m, region or Region(), strongest))
+    rules = ScoringRules(scoring, gate_m, region or Region(), strongest, surface)
+    return score_scene(found, Scene.of(found, capture), rules)
 
 
 def score_scene(found: Detections, scene: Scene, rules: ScoringRules) -> Scores:

@@ -2,33 +2,31 @@
 
 Conventions
 -----------
-* Single frames are correlated (the scene hardly changes between them), so they are never resampled one by one. What is
-  drawn is a group: a capture where there are at least eight, else a block of at least one second of a capture.
-* Below eight groups a bootstrap interval means little: it is NaN, and the value of each group is given instead.
-* Intervals are two-sided with equal tails. All draws are seeded: the same input gives the same interval.
-* A metric is merged before it is evaluated: the value of a set of groups is that of all their frames together, not
-  the mean of the groups' values.
+* A metric is merged before it is evaluated: the value of several captures is that of all their frames together, not
+  the mean of the captures' values.
+* The unit of evidence is a scene or set-up: captures that repeat one another are put together first. How intervals come
+  from units, and from how many, is said in :mod:`uwbbench.measure.accuracy.intervals`; which kind of interval a metric
+  has, the metric says (:attr:`uwbbench.api.metric.Metric.kind`).
+* With one to three scenes, the ends of an estimate describe these recordings only (``within``): four blocks of each
+  capture are compared with one another, never capture with capture. They rank nobody.
+* Nothing is drawn: the same outcomes give the same interval.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from uwbbench.api.arrays import BoolArray, FloatArray, IntArray
 from uwbbench.api.metric import Metric, Outcome
-from uwbbench.measure.accuracy.groups import groups_of, taken
-
-MINIMUM_GROUPS = 8
-"""Fewer groups than this give no interval."""
-
-DEFINED_SHARE = 0.95
-"""Share of the resamples in which a metric must be defined; with less, its interval would describe the rest alone."""
+from uwbbench.measure.accuracy.boards import RANKED_UNITS, Contrast, board, contrast
+from uwbbench.measure.accuracy.evidence import Evidence, interval_of, left_out, merge
+from uwbbench.measure.accuracy.groups import taken
+from uwbbench.measure.accuracy.intervals import CONFIDENCE, INNER_UNITS
 
 
 @dataclass(frozen=True)
@@ -40,14 +38,18 @@ class Estimate:
     value : float
         The metric of all outcomes together; NaN where it is undefined.
     low, high : float
-        Ends of the interval; NaN where there are too few groups.
+        Ends of the interval; NaN where there is none, inf where the data do not reach the end.
     n : int
         Samples behind the value: errors for a metric that stacks them, scored frames for one that counts (none where
         that metric is undefined).
     groups : int
-        Groups that were resampled.
+        Scenes behind it.
     per_group : tuple of float
-        Value of each group where there are too few of them for an interval.
+        Value of each scene where there are too few of them for an inner interval.
+    outer_low, outer_high : float
+        Ends of the outer interval, which is given at any number of scenes; NaN where there is none.
+    within : bool
+        Whether ``low`` and ``high`` describe these recordings only.
     """
 
     value: float
@@ -56,6 +58,9 @@ class Estimate:
     n: int
     groups: int
     per_group: tuple[float, ...] = ()
+    outer_low: float = math.nan
+    outer_high: float = math.nan
+    within: bool = False
 
 
 @dataclass(frozen=True)
@@ -65,16 +70,37 @@ class Difference(Estimate):
     Attributes
     ----------
     p_value : float
-        Two-sided, for the hypothesis that they do not differ; NaN where there are too few groups. Adjust it with
-        :func:`holm` where several detectors are compared.
+        Two-sided, for the hypothesis that they do not differ; NaN within recordings, and where it is undefined. Adjust
+        it with :func:`uwbbench.measure.accuracy.boards.holm` where several detectors are compared.
+    error, degrees : float
+        Standard error, and its degrees of freedom.
     """
 
     p_value: float = math.nan
+    error: float = math.nan
+    degrees: float = math.nan
 
+    @classmethod
+    def of(cls, found: Contrast, confidence: float = CONFIDENCE, **about: Any) -> Difference:
+        """Difference with its interval.
 
-def merge(metric: type[Metric], partials: Sequence[FloatArray]) -> FloatArray:
-    """One partial from several, in the way that the metric merges."""
-    return np.sum(partials, axis=0) if metric.merge == "sum" else np.concatenate(partials)
+        Parameters
+        ----------
+        found : Contrast
+            Of single numbers.
+        confidence : float
+        **about
+            Further attributes: ``n``, ``groups``, ``per_group`` and ``within``.
+        """
+        low, high = (float(end) for end in found.ends(confidence))
+        p_value = math.nan if about.get("within") else float(found.p_value)
+        error, freedom = float(found.error), float(found.degrees)
+        return cls(float(found.value), low, high, p_value=p_value, error=error, degrees=freedom, **about)
+
+    @property
+    def contrast(self) -> Contrast:
+        """The same as arrays."""
+        return Contrast(*(np.asarray(part) for part in (self.value, self.error, self.degrees, self.p_value)))
 
 
 def evaluate(metric: type[Metric], outcomes: Sequence[Outcome]) -> float:
@@ -84,65 +110,68 @@ def evaluate(metric: type[Metric], outcomes: Sequence[Outcome]) -> float:
     return metric.value(merge(metric, [metric.partial(outcome) for outcome in outcomes]))
 
 
-def bootstrap(
+def estimated(
     metric: type[Metric],
     outcomes: Sequence[Outcome],
+    scenes: Sequence[Hashable] = (),
     *,
-    resamples: int = 2000,
-    confidence: float = 0.95,
-    seed: int = 0,
+    confidence: float = CONFIDENCE,
 ) -> Estimate:
-    """Estimate a metric with its percentile-bootstrap interval over groups.
-
-    Percentile interval after Efron and Tibshirani, An Introduction to the Bootstrap (1993), chapter 13, on whole
-    groups, which keeps the correlation inside them.
+    """Value of a metric with its intervals.
 
     Parameters
     ----------
     metric : type of Metric
     outcomes : sequence of Outcome
         One for each capture.
-    resamples : int
+    scenes : sequence
+        What each capture is of; captures of one scene repeat one another. Empty: each is of a scene of its own.
     confidence : float
-        Coverage of the interval.
-    seed : int
+        Coverage of the intervals.
 
     Returns
     -------
     Estimate
     """
-    (groups,) = groups_of([outcomes], MINIMUM_GROUPS)
-    partials = [metric.partial(group) for group in groups]
-    value = metric.value(merge(metric, partials)) if partials else math.nan
-    low, high = _interval(_draws(metric, [partials], resamples, seed)[:, 0], confidence)
-    few = tuple(metric.value(part) for part in partials) if len(groups) < MINIMUM_GROUPS else ()
-    return Estimate(value, low, high, _samples(metric, outcomes, value), len(groups), few)
+    evidence = Evidence.of(metric, [outcomes], scenes)
+    (parts,) = evidence.units
+    value = metric.value(merge(metric, parts)) if parts else math.nan
+    found = interval_of(metric, parts, value, confidence)
+    inner = found
+    if evidence.blocks:
+        inner = interval_of(metric, evidence.blocks[0], value, confidence, evidence.recordings)
+    return Estimate(
+        value,
+        float(inner.low),
+        float(inner.high),
+        samples_behind(metric, outcomes, value),
+        len(parts),
+        tuple(metric.value(part) for part in parts) if len(parts) < INNER_UNITS else (),
+        float(found.outer_low),
+        float(found.outer_high),
+        bool(evidence.blocks),
+    )
 
 
 def paired_difference(
     metric: type[Metric],
     first: Sequence[Outcome],
     second: Sequence[Outcome],
+    scenes: Sequence[Hashable] = (),
     *,
-    resamples: int = 2000,
-    confidence: float = 0.95,
-    seed: int = 0,
+    confidence: float = CONFIDENCE,
 ) -> Difference:
     """Difference of two detectors, first minus second, on the same captures.
-
-    Both are evaluated on the same drawn groups, so that what makes a capture hard for both cancels. The p-value is
-    the achieved significance level of the bootstrap with one added to both counts, so that it is never 0 (Davison and
-    Hinkley, Bootstrap Methods and their Application, 1997, eq. 4.11).
 
     Parameters
     ----------
     metric : type of Metric
     first, second : sequence of Outcome
         One for each capture, the captures in the same order.
-    resamples : int
+    scenes : sequence
+        As in :func:`estimated`.
     confidence : float
         Coverage of the interval.
-    seed : int
 
     Returns
     -------
@@ -155,45 +184,99 @@ def paired_difference(
     """
     if len(first) != len(second):
         raise ValueError(f"a paired comparison needs the same captures, not {len(first)} and {len(second)}")
-    pair = [[metric.partial(group) for group in groups] for groups in groups_of([first, second], MINIMUM_GROUPS)]
-    values = evaluate(metric, first), evaluate(metric, second)
-    drawn = _draws(metric, pair, resamples, seed)
-    differences = drawn[:, 0] - drawn[:, 1]
-    low, high = _interval(differences, confidence)
-    few: tuple[float, ...] = ()
-    if len(pair[0]) < MINIMUM_GROUPS:
-        few = tuple(metric.value(left) - metric.value(right) for left, right in zip(*pair, strict=True))
-    return Difference(
-        value=values[0] - values[1],
-        low=low,
-        high=high,
-        n=min(_samples(metric, first, values[0]), _samples(metric, second, values[1])),
-        groups=len(pair[0]),
-        per_group=few,
-        p_value=math.nan if math.isnan(low) else _p_value(differences),
+    evidence = Evidence.of(metric, [first, second], scenes)
+    values = [metric.value(merge(metric, parts)) if parts else math.nan for parts in evidence.units]
+    within = bool(evidence.blocks)
+    sides = [left_out(metric, parts, evidence.recordings) for parts in evidence.blocks or evidence.units]
+    (left, weight), (other_left, other_weight) = sides
+    found = contrast(values[0] - values[1], left - other_left, (weight, other_weight), blocks=evidence.recordings)
+    pairs = zip(*evidence.units, strict=True)
+    few = len(evidence.units[0]) < INNER_UNITS
+    return Difference.of(
+        found,
+        confidence,
+        n=min(samples_behind(metric, one, value) for one, value in zip((first, second), values, strict=True)),
+        groups=len(evidence.units[0]),
+        per_group=tuple(metric.value(one) - metric.value(other) for one, other in pairs) if few else (),
+        within=within,
     )
 
 
-def paired_draws(
-    metric: type[Metric], series: Sequence[Sequence[Outcome]], *, resamples: int = 2000, seed: int = 0
-) -> FloatArray:
-    """Values of several detectors in resamples of the same captures.
+def paired_board(
+    metric: type[Metric],
+    series: Sequence[Sequence[Outcome]],
+    scenes: Sequence[Hashable] = (),
+    *,
+    confidence: float = CONFIDENCE,
+) -> dict[tuple[int, int], Difference]:
+    """Differences of all pairs of detectors on the same captures: those of :func:`paired_difference`, all at once.
 
     Parameters
     ----------
     metric : type of Metric
     series : sequence of sequences of Outcome
         One for each detector, and in it one for each capture, the captures in the same order.
-    resamples : int
+    scenes : sequence
+        As in :func:`estimated`.
+    confidence : float
+
+    Returns
+    -------
+    dict
+        By the places of both detectors, the smaller first.
+    """
+    pairs = [(one, other) for one in range(len(series)) for other in range(one + 1, len(series))]
+    evidence = Evidence.of(metric, series, scenes)
+    if evidence.blocks or len(evidence.units[0]) < INNER_UNITS:
+        return {
+            (one, other): paired_difference(metric, series[one], series[other], scenes, confidence=confidence)
+            for one, other in pairs
+        }
+    values = np.array([metric.value(merge(metric, parts)) for parts in evidence.units])
+    sides = [left_out(metric, parts, None) for parts in evidence.units]
+    found = board(values, np.stack([left for left, _ in sides]), np.stack([weight for _, weight in sides]))
+    n = [samples_behind(metric, outcomes, value) for outcomes, value in zip(series, values.tolist(), strict=True)]
+    groups = len(evidence.units[0])
+    return {
+        pair: Difference.of(
+            Contrast(*(part[pair] for part in found)), confidence, n=min(n[place] for place in pair), groups=groups
+        )
+        for pair in pairs
+    }
+
+
+def drawn(
+    metric: type[Metric], series: Sequence[Sequence[Outcome]], scenes: Sequence[Hashable], *, draws: int, seed: int
+) -> FloatArray:
+    """Values that several detectors may have on other scenes, drawn together from their joint t distribution.
+
+    Its covariance is that of the jackknife over scenes: what makes a scene hard for all does not tell them apart.
+
+    Parameters
+    ----------
+    metric : type of Metric
+    series : sequence of sequences of Outcome
+        One for each detector, and in it one for each capture, the captures in the same order.
+    scenes : sequence
+        As in :func:`estimated`.
+    draws : int
     seed : int
 
     Returns
     -------
-    (resamples, detectors) array
-        Each row is of one draw of groups, the same for all detectors; no rows where there are too few groups.
+    (draws, detectors) array
+        No rows where there are too few scenes to rank.
     """
-    partials = [[metric.partial(group) for group in groups] for groups in groups_of(list(series), MINIMUM_GROUPS)]
-    return _draws(metric, partials, resamples, seed)
+    evidence = Evidence.of(metric, series, scenes)
+    units = len(evidence.units[0])
+    if units < RANKED_UNITS:
+        return np.empty((0, len(series)))
+    values = np.array([metric.value(merge(metric, parts)) for parts in evidence.units])
+    left = np.stack([left_out(metric, parts, None)[0] for parts in evidence.units])
+    off = (left - values[:, None]) * math.sqrt((left.shape[1] - 1) / left.shape[1])
+    rng = np.random.default_rng(seed)
+    wide = np.sqrt((units - 1) / rng.chisquare(units - 1, size=(draws, 1)))
+    return np.asarray(values + wide * (rng.normal(size=(draws, left.shape[1])) @ off.T))
 
 
 def subset(outcome: Outcome, frames: BoolArray) -> Outcome:
@@ -202,26 +285,6 @@ def subset(outcome: Outcome, frames: BoolArray) -> Outcome:
     position = np.empty(len(outcome.group), np.int64)
     position[rows] = np.arange(len(rows))
     return taken(outcome, rows, np.flatnonzero(frames[outcome.error_frame]), position)
-
-
-def holm(p_values: ArrayLike) -> FloatArray:
-    """Adjust p-values for several comparisons (Holm, Scandinavian Journal of Statistics 6, 1979).
-
-    The i-th smallest of m is multiplied by m - i + 1, made non-decreasing, and cut at 1. NaN stays NaN and does not
-    count as a comparison.
-
-    Examples
-    --------
-    >>> holm([0.01, 0.04, 0.03]).round(6).tolist()
-    [0.03, 0.06, 0.06]
-    """
-    given = np.asarray(p_values, float)
-    adjusted = np.full(given.shape, np.nan)
-    tested = np.flatnonzero(np.isfinite(given))
-    order = tested[np.argsort(given[tested], kind="stable")]
-    factors = len(order) - np.arange(len(order))
-    adjusted[order] = np.minimum(np.maximum.accumulate(given[order] * factors), 1.0)
-    return adjusted
 
 
 def clopper_pearson(successes: float, trials: float, confidence: float = 0.95) -> tuple[float, float]:
@@ -319,44 +382,8 @@ def samples_needed(quantile: float, confidence: float = 0.95) -> int:
     return math.ceil(math.log((1 - confidence) / 2) / math.log(max(quantile, 1 - quantile)))
 
 
-def _samples(metric: type[Metric], outcomes: Sequence[Outcome], value: float) -> int:
+def samples_behind(metric: type[Metric], outcomes: Sequence[Outcome], value: float) -> int:
+    """Samples behind a value: those that a metric stacks; scored frames of one that counts, none if it is undefined."""
     if metric.merge == "stack":
         return sum(len(metric.partial(outcome)) for outcome in outcomes)
     return 0 if math.isnan(value) else sum(len(outcome.group) for outcome in outcomes)
-
-
-def _draws(metric: type[Metric], series: list[list[FloatArray]], resamples: int, seed: int) -> FloatArray:
-    """Metric (resamples, detectors) of drawn groups, the same draw for all detectors; none if groups are too few."""
-    groups = len(series[0])
-    if groups < MINIMUM_GROUPS:
-        return np.empty((0, len(series)))
-    counts = _counts(groups, resamples, seed)
-    return np.stack([metric.resampled(partials, counts) for partials in series], axis=1)
-
-
-@lru_cache(maxsize=64)
-def _counts(groups: int, resamples: int, seed: int) -> FloatArray:
-    """How often each group (resamples, groups) is drawn; as many draws as groups.
-
-    Whole numbers, as floats: products of float matrices are many times faster.
-    """
-    rng = np.random.default_rng(seed)
-    drawn = rng.integers(groups, size=(resamples, groups))
-    cell = drawn + groups * np.arange(resamples)[:, None]
-    return np.bincount(cell.ravel(), minlength=resamples * groups).reshape(resamples, groups).astype(np.float64)
-
-
-def _interval(draws: FloatArray, confidence: float) -> tuple[float, float]:
-    defined = draws[np.isfinite(draws)]
-    if len(defined) == 0 or len(defined) < DEFINED_SHARE * len(draws):
-        return math.nan, math.nan
-    tail = (1 - confidence) / 2
-    low, high = np.quantile(defined, [tail, 1 - tail])
-    return float(low), float(high)
-
-
-def _p_value(differences: FloatArray) -> float:
-    """Two-sided significance level of resampled differences against 0."""
-    defined = differences[np.isfinite(differences)]
-    tail = min(np.sum(defined <= 0), np.sum(defined >= 0))
-    return float(min(1.0, 2 * (tail + 1) / (len(defined) + 1)))

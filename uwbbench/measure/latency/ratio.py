@@ -38,10 +38,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from uwbbench.api.arrays import FloatArray
-from uwbbench.measure.accuracy.stats import MINIMUM_GROUPS
 
 Turn = Callable[[], float]
 """Takes the next turn of a program, and returns its time in seconds."""
+
+MINIMUM_BLOCKS = 8
+"""Fewer blocks than this give no interval of all time."""
 
 TAIL_CASES = 40
 """One case in so many lies beyond each end of an interval."""
@@ -146,7 +148,7 @@ def ratio_summary(ours_s: FloatArray, reference_s: FloatArray, resamples: int = 
     ratio = Ratio.of(log_ratios(ours_s, reference_s))
     ours, reference = ours_s.sum(axis=1), reference_s.sum(axis=1)
     ends: list[float | None] = [None] * 4
-    if ratio.n >= MINIMUM_GROUPS:
+    if ratio.n >= MINIMUM_BLOCKS:
         drawn = np.random.default_rng(0).integers(ratio.n, size=(resamples, ratio.n))
         total = ours[drawn].sum(axis=1) / reference[drawn].sum(axis=1)
         ends = [ratio.low, ratio.high, *map(float, np.quantile(total, [0.025, 0.975]))]

@@ -3,7 +3,7 @@
 Conventions
 -----------
 * Both runs are judged again under the rules of the first one, so that what differs is what was detected.
-* Differences are second minus first, on the same captures, with paired bootstrap intervals; p-values are adjusted after
+* Differences are second minus first, on the same captures, with intervals over scenes; p-values are adjusted after
   Holm over the detectors of a dataset, scoring and table, for each metric.
 * Of times only the ratio to the reference is compared, and only where both used the same reference. Its interval is
   that of two independent log-normal values, each inside its run; it does not know how much processes differ.
@@ -19,8 +19,9 @@ from typing import Any
 
 from uwbbench.api.errors import ScoringError
 from uwbbench.api.metric import Metric, Outcome
+from uwbbench.measure.accuracy.boards import holm
 from uwbbench.measure.accuracy.scoring import ScoringRules, outcomes
-from uwbbench.measure.accuracy.stats import Difference, evaluate, holm, paired_difference
+from uwbbench.measure.accuracy.stats import Difference, evaluate, paired_difference
 from uwbbench.results.comparison.units import Unit
 from uwbbench.results.pareto import NORMAL_975, Speed, speeds_of_run
 from uwbbench.results.slices import Board
@@ -40,7 +41,7 @@ class ScoreChange:
     difference : Difference
         After minus before.
     adjusted : float
-        The p-value after Holm; NaN where there are too few groups.
+        The p-value after Holm; NaN within the recordings of one to three scenes.
     """
 
     board: Board
@@ -96,9 +97,9 @@ def score_changes(
     rules : sequence of ScoringRules
     metrics : mapping of str to type of Metric
     settings : mapping
-        ``resamples``, ``confidence`` and ``seed`` of the intervals.
+        ``confidence`` of the intervals.
     """
-    boards: dict[Board, dict[str, list[tuple[Outcome, Outcome]]]] = defaultdict(lambda: defaultdict(list))
+    boards: dict[Board, dict[str, list[tuple[Outcome, Outcome, str]]]] = defaultdict(lambda: defaultdict(list))
     missing: dict[str, None] = {}
     for unit in units:
         for rule in rules:
@@ -110,22 +111,22 @@ def score_changes(
             for table in before:
                 if table in after:
                     board = unit.dataset, unit.header.source, rule.scoring, table
-                    boards[board][unit.detector].append((before[table], after[table]))
+                    boards[board][unit.detector].append((before[table], after[table], unit.scene))
     every = [change for board, members in boards.items() for change in _changes(board, members, metrics, settings)]
     return every, list(missing)
 
 
 def _changes(
     board: Board,
-    members: Mapping[str, list[tuple[Outcome, Outcome]]],
+    members: Mapping[str, list[tuple[Outcome, Outcome, str]]],
     metrics: Mapping[str, type[Metric]],
     settings: Mapping[str, Any],
 ) -> Iterator[ScoreChange]:
     for name, metric in metrics.items():
         rows = []
         for detector, pairs in members.items():
-            before, after = [pair[0] for pair in pairs], [pair[1] for pair in pairs]
-            difference = paired_difference(metric, after, before, **settings)
+            before, after, scenes = (list(part) for part in zip(*pairs, strict=True))
+            difference = paired_difference(metric, after, before, scenes, confidence=settings["confidence"])
             rows.append((detector, len(pairs), evaluate(metric, before), evaluate(metric, after), difference))
         adjusted = holm([row[-1].p_value for row in rows]).tolist()
         for (detector, captures, old, new, difference), p_value in zip(rows, adjusted, strict=True):

@@ -39,6 +39,12 @@ class Unit:
         """Name of the capture."""
         return self.entries[0].capture
 
+    @property
+    def scene(self) -> str:
+        """Scene that the capture is of, by the run that knows which captures repeat it."""
+        known = [folder.scene(self.dataset, self.capture) for folder in self.folders]
+        return known[0] if known[0] != self.capture else known[1]
+
     @cached_property
     def header(self) -> CaptureHeader:
         """The capture without its samples."""

@@ -1,79 +1,37 @@
-"""Who is better than whom, how sure that is, and who is as good for all practical purposes.
+"""The boards of a suite, with the ranks of their detectors, and times put together over machines.
 
 Conventions
 -----------
 * A board is one dataset, source, scoring and table of a suite; numbers of different boards are never combined.
 * Boards are ranked by the metric that their experiment lists first, or by F1; by recall where the truth is not
   exhaustive.
-* Two detectors are compared on the captures that both were scored on, in pairs: both are evaluated on the same drawn
-  captures (or blocks of a second, where captures are few). The p-values of all pairs of a board are adjusted together
-  after Holm, for each metric.
-* Two detectors *differ* if the adjusted p-value is below 0.05. They are *practically equal* if the whole 95 %
-  interval of their difference lies within the metric's margin (0.01 of a share, 1 cm of an error), which a difference
-  may do that is certain but does not matter: then they are called equal. Otherwise the captures do not decide.
-* The rank of a detector is one more than the number of ranked ones that are better by more than chance and more than
-  the margin. Detectors share ranks, and one that was not scored on all captures of the board has none.
+* Ranks, comparisons and the words for them are those of :mod:`uwbbench.results.verdicts`.
 * Time is the ratio to the reference detector of the suite, measured in alternating blocks on one machine. Over several
   machines it is the geometric mean, and its interval reaches from the lowest to the highest end.
 """
 
 from __future__ import annotations
 
-import dataclasses
-import itertools
 import math
 from collections import Counter, defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
 from uwbbench.measure.accuracy.metrics.choice import MetricChoice
-from uwbbench.measure.accuracy.stats import MINIMUM_GROUPS, Difference, Estimate, holm, paired_difference
+from uwbbench.measure.accuracy.stats import Estimate
 from uwbbench.results.leaderboard.runs import Run
 from uwbbench.results.leaderboard.suites import Contender, Suite
 from uwbbench.results.pareto import Speed, speed_of
 from uwbbench.results.results import Scored, estimates_of
 from uwbbench.results.slices import Board
+from uwbbench.results.verdicts import Pair, Ranks, ranks_of
 from uwbbench.run.folder.journal import Entry
 
-SETTINGS: dict[str, Any] = {"resamples": 2000, "confidence": 0.95, "seed": 0}
+SETTINGS: dict[str, Any] = {"confidence": 0.95, "seed": 0}
 """Of all intervals of a site, whatever the runs used for theirs."""
-
-SIGNIFICANCE = 0.05
-
-Verdict = Literal["differs", "equal", "undecided", "too few groups", "undefined"]
-
-
-@dataclass(frozen=True)
-class Pair:
-    """Two detectors on the captures that both were scored on.
-
-    Attributes
-    ----------
-    first, second : str
-        Keys of contenders.
-    metric : str
-    captures : int
-    difference : Difference
-        First minus second.
-    adjusted : float
-        The p-value after Holm.
-    verdict : {"differs", "equal", "undecided", "too few groups", "undefined"}
-        Undefined where one of them has no value, as it found nothing.
-    better : str or None
-        Key of the better one; None unless they differ, or where neither end of the metric is better.
-    """
-
-    first: str
-    second: str
-    metric: str
-    captures: int
-    difference: Difference
-    adjusted: float
-    verdict: Verdict
-    better: str | None
 
 
 @dataclass(frozen=True)
@@ -85,15 +43,15 @@ class Standing:
     contender : Contender
     scored : tuple of Scored
     estimates : mapping of str to Estimate
-    rank : int or None
-        None where it was not scored on all captures, or the captures are too few to compare.
+    ranks : (int, int) or None
+        Smallest and largest rank that it may have; None where it was not scored on all captures, or scenes are too few.
     speed : Speed or None
     """
 
     contender: Contender
     scored: tuple[Scored, ...]
     estimates: Mapping[str, Estimate]
-    rank: int | None
+    ranks: tuple[int, int] | None
     speed: Speed | None
 
 
@@ -107,21 +65,31 @@ class Ranking:
     board : Board
     exhaustive : bool
         Whether the truth names all that is visible.
-    main : str
-        The metric that ranks.
-    captures : int
-        Captures that any of them was scored on.
     standings : tuple of Standing
-    pairs : tuple of Pair
+    ranks : Ranks
+        Order, rank sets and comparisons, by the contenders' keys.
     """
 
     suite: Suite
     board: Board
     exhaustive: bool
-    main: str
-    captures: int
     standings: tuple[Standing, ...]
-    pairs: tuple[Pair, ...]
+    ranks: Ranks
+
+    @property
+    def main(self) -> str:
+        """The metric that ranks."""
+        return self.ranks.main
+
+    @property
+    def captures(self) -> int:
+        """Captures that any of them was scored on."""
+        return self.ranks.captures
+
+    @property
+    def pairs(self) -> tuple[Pair, ...]:
+        """Comparisons of all pairs of them."""
+        return self.ranks.pairs
 
     @property
     def metrics(self) -> MetricChoice:
@@ -134,27 +102,8 @@ class Ranking:
         return self.metrics.headline(exhaustive=self.exhaustive)
 
     def pair(self, first: str, second: str, metric: str) -> Pair | None:
-        """Comparison of two contenders, first minus second, in whichever order it is stored.
-
-        Parameters
-        ----------
-        first, second : str
-            Keys of contenders.
-        metric : str
-
-        Returns
-        -------
-        Pair or None
-            None where the two were not compared by this metric.
-        """
-        for pair in self.pairs:
-            if (pair.first, pair.second, pair.metric) == (first, second, metric):
-                return pair
-            if (pair.second, pair.first, pair.metric) == (first, second, metric):
-                d = pair.difference
-                turned = dataclasses.replace(d, value=-d.value, low=-d.high, high=-d.low)
-                return dataclasses.replace(pair, first=first, second=second, difference=turned)
-        return None
+        """As :meth:`uwbbench.results.verdicts.Ranks.pair`."""
+        return self.ranks.pair(first, second, metric)
 
 
 def rankings(suite: Suite) -> list[Ranking]:
@@ -170,66 +119,18 @@ def rankings(suite: Suite) -> list[Ranking]:
 
 
 def _ranking(suite: Suite, board: Board, members: Mapping[str, list[Scored]]) -> Ranking:
-    every = [one for scored in members.values() for one in scored]
     metrics = suite.metrics
-    exhaustive = all(one.outcome.exhaustive for one in every)
-    main = metrics.ranking(exhaustive=exhaustive)
-    captures = len({one.capture for one in every})
-    pairs = _pairs(members, metrics, metrics.compared(exhaustive=exhaustive))
+    exhaustive = all(one.outcome.exhaustive for scored in members.values() for one in scored)
+    estimates = {key: estimates_of(metrics, scored, SETTINGS) for key, scored in members.items()}
     speeds = speeds_of(suite, board[0])
-    complete = {key for key, scored in members.items() if len(scored) == captures}
-    ahead: Counter[str] = Counter()
-    for pair in pairs:
-        if pair.metric == main and pair.better in complete:
-            ahead[pair.second if pair.better == pair.first else pair.first] += 1
-    decidable = (
-        any(p.metric == main and p.verdict in ("differs", "equal", "undecided") for p in pairs) or len(members) == 1
-    )
-    standings = []
-    for contender in suite.contenders:
-        scored = members.get(contender.key, [])
-        if not scored:
-            continue
-        estimates = estimates_of(metrics, scored, SETTINGS)
-        ranked = decidable and contender.key in complete
-        rank = ahead[contender.key] + 1 if ranked else None
-        standings.append(Standing(contender, tuple(scored), estimates, rank, speeds.get(contender.key)))
-    standings.sort(key=lambda one: _order(one, metrics[main].merit(one.estimates[main].value)))
-    return Ranking(suite, board, exhaustive, main, captures, tuple(standings), pairs)
-
-
-def _order(standing: Standing, merit: float) -> tuple[Any, ...]:
-    """Ranked ones first, the best first; undefined values last."""
-    return standing.rank is None, standing.rank or 0, math.inf if math.isnan(merit) else -merit, standing.contender.name
-
-
-def _pairs(members: Mapping[str, list[Scored]], metrics: MetricChoice, names: Sequence[str]) -> tuple[Pair, ...]:
-    by_capture = {key: {one.capture: one.outcome for one in scored} for key, scored in members.items()}
-    pairs = []
-    for name in names:
-        metric, compared = metrics[name], []
-        for first, second in itertools.combinations(by_capture, 2):
-            shared = sorted(set(by_capture[first]) & set(by_capture[second]))
-            series = [[by_capture[key][capture] for capture in shared] for key in (first, second)]
-            compared.append((first, second, len(shared), paired_difference(metric, *series, **SETTINGS)))
-        adjusted = holm([one[3].p_value for one in compared])
-        for (first, second, captures, difference), p_value in zip(compared, adjusted.tolist(), strict=True):
-            verdict = _verdict(difference, p_value, metric.margin)
-            better = None
-            if verdict == "differs" and metric.better != "zero":
-                better = first if metric.merit(difference.value) > 0 else second
-            pairs.append(Pair(first, second, name, captures, difference, p_value, verdict, better))
-    return tuple(pairs)
-
-
-def _verdict(difference: Difference, adjusted: float, margin: float) -> Verdict:
-    if difference.groups < MINIMUM_GROUPS:
-        return "too few groups"
-    if math.isnan(difference.value) or math.isnan(difference.low):
-        return "undefined"
-    if -margin < difference.low and difference.high < margin:
-        return "equal"
-    return "differs" if adjusted < SIGNIFICANCE else "undecided"
+    times = {key: speed.ratio for key, speed in speeds.items()}
+    ranks = ranks_of(members, metrics, estimates, times, metrics.compared(exhaustive=exhaustive))
+    contenders = {one.key: one for one in suite.contenders}
+    standings = [
+        Standing(contenders[key], tuple(members[key]), estimates[key], ranks.sets.get(key), speeds.get(key))
+        for key in ranks.order
+    ]
+    return Ranking(suite, board, exhaustive, tuple(standings), ranks)
 
 
 # Times ---------------------------------------------------------------------------------------------------------

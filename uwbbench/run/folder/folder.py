@@ -84,6 +84,10 @@ class RunFolder:
         write_json(path / "manifest.json", {"format": FORMAT, "format_version": VERSION, **manifest})
         return cls(path)
 
+    def scene(self, dataset: str, capture: str) -> str:
+        """Scene or set-up that a capture is of: its own name, unless the run knows which captures repeat it."""
+        return str(self.manifest.get("scenes", {}).get(dataset, {}).get(capture, capture))
+
     def update_manifest(self, **values: Any) -> None:
         """Replace top-level values of the manifest, and break its seal: more results are to come."""
         kept = {key: value for key, value in self.manifest.items() if key not in ("files", "seal")}

@@ -119,7 +119,13 @@ def accuracy_identity(detector: str, sha256: str, rules: Sequence[ScoringRules])
         Of the capture's content.
     rules : sequence of ScoringRules
     """
-    return digest(["accuracy", detector, sha256, [asdict(rule) for rule in rules]])
+    return digest(["accuracy", detector, sha256, [_facts_of(rule) for rule in rules]])
+
+
+def _facts_of(rule: ScoringRules) -> dict[str, Any]:
+    """Rules as plain values, without a choice that earlier versions lacked where it is what they did."""
+    facts = asdict(rule)
+    return facts if facts.pop("surface") == "outline" else asdict(rule)
 
 
 def latency_identity(detector: str, sha256: str, settings: Mapping[str, Any], machine: Mapping[str, Any]) -> str:

@@ -30,7 +30,9 @@ def rules_of(experiment: Mapping[str, Any]) -> tuple[ScoringRules, ...]:
     """Scoring rules of an experiment as the manifest holds it, one for each scoring."""
     region = Region(**RegionModel.model_validate(experiment["region"]).limits)
     return tuple(
-        ScoringRules(scoring, experiment["gate_m"], region, experiment["strongest"])
+        ScoringRules(
+            scoring, experiment["gate_m"], region, experiment["strongest"], experiment.get("surface", "outline")
+        )
         for scoring in experiment["scoring"]
     )
 

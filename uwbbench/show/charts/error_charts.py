@@ -77,7 +77,7 @@ def by_range(title: str, slices: Sequence[Slice], spans: Sequence[str], names: M
             "encoding": {**place, "y": up, **look, "tooltip": tooltip},
         },
     ]
-    subtitle = "Bars: bootstrap intervals; a bin with too few groups has none."
+    subtitle = "Bars: 95 % intervals; with too few scenes, a bin has none."
     return chart(title, subtitle, layers, data={"values": rows})
 
 

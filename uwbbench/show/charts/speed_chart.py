@@ -104,7 +104,7 @@ def speed_against_error(title: str, points: Sequence[Point], names: Mapping[str,
     ]
     better = {"higher": "up", "lower": "down", "zero": "towards 0"}[quantity.better]
     subtitle = (
-        f"Better: left and {better}. Filled, with its bootstrap probability P: on the front, where no other is both as "
+        f"Better: left and {better}. Filled, with its probability P: on the front, where no other is both as "
         "fast and as good."
     )
     return chart(title, subtitle, layers, data={"values": rows})

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from uwbbench.api.errors import ConfigError, nearest
@@ -131,7 +131,7 @@ def draw_run(
         raise ConfigError(f"{folder.path}: a run folder holds no samples; plot '{kind}' from the capture file")
     rules = rules_of_run(folder, choices.scoring)
     if choices.gate_m is not None:
-        rules = ScoringRules(rules.scoring, choices.gate_m, rules.region, rules.strongest)
+        rules = replace(rules, gate_m=choices.gate_m)
     return _draw_results(kind, from_run(folder, detector, capture, dataset), rules, choices, str(folder.path))
 
 

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from uwbbench.api import registry
 from uwbbench.api.metric import Outcome
+from uwbbench.measure.accuracy.evidence import SHORTEST_S
 from uwbbench.measure.accuracy.metrics.choice import MetricChoice
 from uwbbench.measure.accuracy.scoring import ScoreBlock, Scores
-from uwbbench.measure.accuracy.stats import MINIMUM_GROUPS, Estimate, bootstrap
+from uwbbench.measure.accuracy.stats import Estimate, estimated
 from uwbbench.show.notebook import elements
 from uwbbench.show.text.numbers import UNDEFINED, between, number
 from uwbbench.show.text.quantity import Quantity
@@ -14,7 +15,7 @@ from uwbbench.show.text.wording import TABLES
 
 
 def scores(shown: Scores) -> str:
-    """HTML of scores: each table's metrics with n and a 95 % interval over blocks of a second, and the counts."""
+    """HTML of scores: each table's metrics with n and a 95 % interval within the recording, and the counts."""
     rules = shown.rules
     parts = []
     for name, title in TABLES.items():
@@ -26,14 +27,11 @@ def scores(shown: Scores) -> str:
 
 def _table(outcome: Outcome) -> str:
     metrics = MetricChoice(list(registry.entries("metrics")))
-    estimates = {name: bootstrap(metric, [outcome]) for name, metric in metrics.items() if name not in metrics.absent}
+    estimates = {name: estimated(metric, [outcome]) for name, metric in metrics.items() if name not in metrics.absent}
     rows = [_row(Quantity.of(name, metrics[name]), estimate) for name, estimate in estimates.items()]
-    groups = next(iter(estimates.values())).groups
-    few = f"{groups} blocks of a second: too few (below {MINIMUM_GROUPS}) for intervals"
-    enough = (
-        f"intervals: 95 %, bootstrap over {groups} blocks of a second of this one capture; other captures may differ"
-    )
-    note = enough if groups >= MINIMUM_GROUPS else few
+    enough = "intervals: 95 %, within this recording only, from four blocks of it; says nothing about other scenes"
+    few = f"intervals: of one scene that may end all or nothing; the recording is shorter than {SHORTEST_S:g} s"
+    note = enough if any(estimate.within for estimate in estimates.values()) else few
     return elements.table(("metric", "value", "interval", "n"), rows, numbers=True) + elements.notes([note])
 
 

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
-from uwbbench.measure.accuracy.stats import MINIMUM_GROUPS
+from uwbbench.results.verdicts import WITHIN
 from uwbbench.show.text.numbers import times
 
 if TYPE_CHECKING:
@@ -34,9 +33,10 @@ def _sentence(content: Content, about: Mapping[str, Any], estimates: Mapping[str
     text = f"On {what} ({about['scored_frames']} scored frames, {about['scoring']} scoring), "
     if not estimates[main.name].value > 0 and main.better == "higher":
         return f"{text}no detector found anything."
-    text += f"{leader} leads with {figures}"
-    if math.isnan(estimates[main.name].low):
-        text += f" (no intervals: fewer than {MINIMUM_GROUPS} groups)"
+    board = about["dataset"], about["source"], about["scoring"], about["table"]
+    text += content.report.ranks[board].opening(content.detectors, figures)
+    if estimates[main.name].within:
+        text += f" (intervals {WITHIN})"
     speed = content.speeds.get(about["dataset"], {}).get(about["detector"])
     if speed is None:
         return f"{text}; it was not timed."

@@ -184,7 +184,7 @@ class Content:
             "boards": [self._board(board, materials) for board in boards],
             "spans": self.spans,
             "rows": rows,
-            "timed": COLUMNS,
+            "timed": COLUMNS if self.timings else [],
             "times": [[timed_cells(self, dataset).get(name) for name in detectors] for dataset in self.datasets],
             "charts": {
                 kind: {"specs": specs, "empty": BOARD_CHARTS[kind].empty} for kind, specs in self.board_charts.items()

@@ -23,10 +23,15 @@
     }
     return lines;
   }
-  function fitLegends(part, columns) {
-    if (part === null || typeof part !== "object") return;
-    if (part.legend?.columns) part.legend.columns = columns;
-    for (const value of Object.values(part)) if (!Array.isArray(value) || value.length < 40) fitLegends(value, columns);
+  // Legends take as many columns as there is room for, and charts grow by the lines that legend and title need.
+  function legendLines(part, columns) {
+    if (part === null || typeof part !== "object" || (Array.isArray(part) && part.length > 40)) return 0;
+    let lines = 0;
+    if (part.legend?.columns) {
+      part.legend.columns = Math.min(columns, part.legend.columns);
+      lines = Math.ceil((part.scale?.domain?.length ?? 1) / part.legend.columns);
+    }
+    return Math.max(lines, ...Object.values(part).map((inner) => legendLines(inner, columns)));
   }
   async function draw(place, spec, why) {
     views.get(place)?.finalize();
@@ -42,7 +47,9 @@
     }
     fitted.title.text = wrapped(head.text, letters);
     fitted.title.subtitle = wrapped(head.subtitle ?? "", letters * 1.12);
-    fitLegends(fitted, Math.max(2, Math.floor(place.clientWidth / 170)));
+    const named = spec.layer.some((layer) => layer.encoding?.y?.type === "nominal");
+    const columns = Math.max(1, Math.floor((place.clientWidth - (named ? 200 : 50)) / 150)), lines = fitted.title.text.length + fitted.title.subtitle.length - 2;
+    fitted.height = spec.height + 15 * lines + 18 * Math.max(0, legendLines(fitted, columns) - 1);
     const made = await vegaEmbed(place, fitted, options);
     views.set(place, { ...made, finalize: made.finalize, source: spec });
     const picture = place.querySelector("svg");

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from uwbbench.measure.accuracy.stats import MINIMUM_GROUPS
+from uwbbench.results.verdicts import INTERVALS
 from uwbbench.show.page import answer, error_sections, limits_section
 from uwbbench.show.page.limits_section import limits
 from uwbbench.show.page.section import Section
@@ -55,8 +55,8 @@ def leaderboard(content: Content) -> Section | None:
         return None
     confidence = f"{content.report.experiment['intervals']['confidence']:.0%}"
     notes = (
-        f"Value, and below it the {confidence} bootstrap interval over captures, or over blocks of a second where "
-        f"captures are fewer than {MINIMUM_GROUPS}. Errors are those of all retained detections; \u201cof "
+        f"Value, and below it its {confidence} interval. {INTERVALS} Errors are those of all retained detections; "
+        "\u201cof "
         "matches\u201d counts true positives only: read it with recall. n/a: undefined. Absolute times hold on one "
         "machine only; the ratio travels.",
     )
@@ -70,9 +70,9 @@ def pareto(content: Content) -> Section | None:
     settings = content.report.experiment["intervals"]
     note = (
         "Across: time a frame in times of the reference detector, measured in alternating blocks. Up: the chosen "
-        f"metric. Bars: {settings['confidence']:.0%} intervals. P: share of {settings['resamples']} bootstrap draws in "
-        "which no other detector is both as fast and as good; captures are drawn anew, the same for all detectors, and "
-        "time ratios from a log-normal distribution through their stored intervals. Detectors that find nothing are "
+        f"metric. Bars: {settings['confidence']:.0%} intervals. P: share of draws in which no other "
+        "detector is both as fast and as good; values are drawn from their joint distribution over scenes, and time "
+        "ratios from a log-normal distribution through their stored intervals. Detectors that find nothing are "
         "not drawn."
     )
     return Section("pareto", "Speed against error", of_board=("pareto",), notes=(note,))

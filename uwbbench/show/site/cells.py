@@ -6,7 +6,8 @@ import math
 import re
 
 from uwbbench.measure.accuracy.stats import Estimate
-from uwbbench.results.leaderboard.ranking import Pair, Ranking, Standing
+from uwbbench.results.leaderboard.ranking import Ranking, Standing
+from uwbbench.results.verdicts import Pair, rank_text
 from uwbbench.show.html.cell import Cell
 from uwbbench.show.text.numbers import between, interval, number, significant
 from uwbbench.show.text.quantity import Quantity
@@ -22,6 +23,12 @@ def metric_cell(by: Quantity, estimate: Estimate) -> Cell:
     text = number(estimate.value, by.digits, by.factor)
     ends = between(estimate.low, estimate.high, by.digits, by.factor)
     return Cell(text, small=ends, key=_key(estimate.value), title=by.in_full(estimate))
+
+
+def rank_cell(standing: Standing) -> Cell:
+    """Rank set of a detector."""
+    key = "n/a" if standing.ranks is None else f"{sum(standing.ranks) / 2:g}"
+    return Cell(rank_text(standing.ranks), key=key)
 
 
 def speed_cell(standing: Standing) -> Cell:

@@ -7,29 +7,23 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
+from uwbbench.measure.accuracy.boards import RANKED_UNITS
 from uwbbench.results.leaderboard.ranking import Ranking, Standing, rankings, reference_of
 from uwbbench.results.leaderboard.runs import Run
 from uwbbench.results.leaderboard.suites import Contender, Suite
 from uwbbench.results.results import errors_in
+from uwbbench.results.verdicts import WITHIN, WORDS, listed
 from uwbbench.run.folder.identity import digest
 from uwbbench.show.html.cell import Cell, Table
 from uwbbench.show.looks import Look, looks
 from uwbbench.show.site import charts
-from uwbbench.show.site.cells import metric_cell, pair_cell, pair_text, quantity, speed_cell
+from uwbbench.show.site.cells import metric_cell, pair_cell, pair_text, quantity, rank_cell, speed_cell
 from uwbbench.show.site.error_pictures import error_pictures
 from uwbbench.show.site.names import Names
 from uwbbench.show.text.numbers import p_value
 from uwbbench.show.text.quantity import undefined_titles
 from uwbbench.show.text.sheet import sentence, shown
 from uwbbench.show.text.wording import TABLES
-
-VERDICTS = {
-    "differs": "differ",
-    "equal": "practically equal",
-    "undecided": "not distinguished",
-    "too few groups": "too few groups to decide",
-    "undefined": "undefined: one of them found nothing",
-}
 
 
 @dataclass(frozen=True)
@@ -133,7 +127,7 @@ class Content:
         leader = ranking.standings[0]
         rows = []
         for one in ranking.standings:
-            rank = Cell("–", key="n/a") if one.rank is None else Cell(str(one.rank))
+            rank = rank_cell(one)
             first, *others = [metric_cell(by, one.estimates[name]) for name, by in quantities.items()]
             cells = [
                 self.detector_cell(one),
@@ -168,7 +162,7 @@ class Content:
             return Cell("n/a")
         word = {"differs": "worse" if pair.better == pair.second else "better", "equal": "equal"}.get(pair.verdict)
         difference = pair_text(ranking, pair)
-        return Cell(word or pair.verdict, small=difference, title=f"adjusted p {p_value(pair.adjusted)}")
+        return Cell(word or WORDS[pair.verdict], small=difference, title=f"adjusted p {p_value(pair.adjusted)}")
 
     @staticmethod
     def _board_notes(ranking: Ranking) -> Iterator[str]:
@@ -180,35 +174,35 @@ class Content:
         elif ranking.metrics.listed:
             yield f"The rank is by {quantity(ranking, ranking.main).title}."
         yield from ranking.metrics.notes
-        if all(one.rank is None for one in ranking.standings):
-            yield "No ranks: captures, or blocks of a second, are too few to distinguish detectors."
-        elif any(one.rank is None for one in ranking.standings):
+        if all(one.ranks is None for one in ranking.standings):
+            there = "is 1" if ranking.ranks.scenes == 1 else f"are {ranking.ranks.scenes}"
+            yield f"No ranks: {RANKED_UNITS} scenes are needed, and there {there}."
+            if any(one.estimates[ranking.main].within for one in ranking.standings):
+                yield f"Intervals: {WITHIN}."
+        elif any(one.ranks is None for one in ranking.standings):
             yield "– : no rank, as the detector was not scored on all captures of this board; its numbers are of fewer."
 
     def sentence(self, section: Section) -> str:
-        """Who leads, and who is as good."""
+        """Who comes first, whether it leads, and who is as good."""
         ranking = section.main
         first, others = ranking.standings[0], ranking.standings[1:]
         by = quantity(ranking, ranking.main)
-        highest = "highest" if by.better == "higher" else "lowest"
+        names = self.names.detectors
+        figures = f"{by.title} {by.value_of(first.estimates[ranking.main])} ({ranking.board[2]} scoring)"
+        text = ranking.ranks.opening(names, figures)
         words: dict[str, list[str]] = {}
         for one in others:
             pair = ranking.pair(first.contender.key, one.contender.key, ranking.main)
             if pair is not None:
-                words.setdefault(pair.verdict, []).append(self.names.detectors[one.contender.key])
-        text = (
-            f"{self.names.detectors[first.contender.key]} has the {highest} {by.title}, "
-            f"{by.value_of(first.estimates[ranking.main])} ({ranking.board[2]} scoring)"
-        )
+                words.setdefault(pair.verdict, []).append(names[one.contender.key])
         for verdict, said in (
             ("equal", "practically equal to it: {}"),
-            ("undecided", "not distinguished from it: {}"),
+            ("not told apart", "not told apart from it: {}"),
             ("differs", "significantly different from it: {}"),
-            ("too few groups", "too few captures to compare it with: {}"),
             ("undefined", "nothing to compare it with: {}"),
         ):
             if verdict in words:
-                text += "; " + said.format(", ".join(words[verdict]))
+                text += "; " + said.format(listed(words[verdict]))
         return text + "."
 
     # Charts ----------------------------------------------------------------------------------------------------
@@ -235,11 +229,11 @@ class Content:
             by = quantity(ranking, pair.metric)
             names = [Cell(self.names.detectors[key]) for key in (pair.first, pair.second)]
             counts = [Cell(str(pair.captures)), Cell(str(pair.difference.groups))]
-            verdict = Cell(VERDICTS[pair.verdict])
+            verdict = Cell(WORDS[pair.verdict])
             rows.append(
                 (*names, Cell(by.title), pair_cell(ranking, pair), Cell(p_value(pair.adjusted)), verdict, *counts)
             )
-        columns = ("first", "second", "metric", "difference", "adjusted p", "verdict", "captures", "groups (n)")
+        columns = ("first", "second", "metric", "difference", "adjusted p", "verdict", "captures", "scenes (n)")
         return Table("Compared in pairs", columns, tuple(rows))
 
     def suite_facts(self, suite: Suite) -> list[tuple[str, str]]:
@@ -291,10 +285,12 @@ def _board_dict(ranking: Ranking) -> dict[str, Any]:
         "table": table,
         "ranked_by": ranking.main,
         "captures": ranking.captures,
+        "scenes": ranking.ranks.scenes,
         "standings": [
             {
                 **who[one.contender.key],
-                "rank": one.rank,
+                "rank": None if one.ranks is None else one.ranks[0],
+                "rank_high": None if one.ranks is None else one.ranks[1],
                 "captures": len(one.scored),
                 "runs": [run.name for run in one.contender.runs],
                 "estimates": {name: vars(estimate) for name, estimate in one.estimates.items()},

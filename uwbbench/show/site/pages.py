@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
-from uwbbench.measure.accuracy.stats import MINIMUM_GROUPS
-from uwbbench.results.leaderboard.ranking import SETTINGS, SIGNIFICANCE, speeds_by_machine
+from uwbbench.measure.accuracy.boards import EQUAL_CONFIDENCE, RANKED_UNITS, SIGNIFICANCE
+from uwbbench.measure.accuracy.intervals import INNER_UNITS
+from uwbbench.results.leaderboard.ranking import SETTINGS, speeds_by_machine
 from uwbbench.results.leaderboard.suites import Contender, Suite
+from uwbbench.results.verdicts import INTERVALS, WORDS
 from uwbbench.show.html.cell import Cell, Table
 from uwbbench.show.html.render import badge
-from uwbbench.show.site.cells import metric_cell, pair_cell, quantity
-from uwbbench.show.site.content import VERDICTS, Content, Section
+from uwbbench.show.site.cells import metric_cell, pair_cell, quantity, rank_cell
+from uwbbench.show.site.content import Content, Section
 from uwbbench.show.site.matrix import CSV, matrix
 from uwbbench.show.text.numbers import interval, number, p_value
 from uwbbench.show.text.sheet import sentence, shown
@@ -81,12 +83,13 @@ class Page:
 
 
 HOW = (
-    f"Rank: one more than the number of detectors that are better by more than chance (Holm-adjusted p below "
-    f"{SIGNIFICANCE:g}) and more than the margin. Detectors share ranks.",
-    f"Practically equal: the whole {SETTINGS['confidence']:.0%} interval of the difference lies within the metric's "
-    "margin. Not distinguished: the captures do not decide.",
-    "Pairs are compared on the captures that both were scored on, on the same bootstrap draws of captures; of blocks "
-    f"of a second where captures are fewer than {MINIMUM_GROUPS}. Brackets: {SETTINGS['confidence']:.0%} intervals.",
+    "Rank: a set, such as 1-3: one more than the number of detectors that are better by more than chance (adjusted p "
+    f"below {SIGNIFICANCE:g}) and more than the margin, up to all but those that are worse. Below {RANKED_UNITS} "
+    "scenes nobody is ranked.",
+    f"Practically equal: the whole {EQUAL_CONFIDENCE:.0%} interval of the difference lies within the metric's margin, "
+    f"from {INNER_UNITS} scenes on. Not told apart: the scenes do not decide.",
+    f"Pairs are compared on the captures that both were scored on. Brackets: {SETTINGS['confidence']:.0%} intervals. "
+    + INTERVALS,
     "Time is only given as a ratio to the common reference detector, measured in alternating blocks on one machine. "
     "Over several machines: geometric mean, and the interval from the lowest end to the highest.",
 )
@@ -257,7 +260,7 @@ def _results(content: Content, contender: Contender, sections: list[Section]) ->
                     Cell(section.title, link=section.address),
                     Cell(content.names.suite(section.suite)),
                     Cell(f"{ranking.board[2]}, after {ranking.board[3]}"),
-                    Cell("–", key="n/a") if one.rank is None else Cell(f"{one.rank} of {len(ranking.standings)}"),
+                    replace(rank_cell(one), title=f"of {len(ranking.standings)}"),
                 ]
                 captures = Cell(f"{len(one.scored)} of {ranking.captures}")
                 cells = [
@@ -279,7 +282,7 @@ def _others(content: Content, contender: Contender, sections: list[Section]) -> 
                 pair = ranking.pair(contender.key, one.contender.key, name)
                 if pair is None:
                     continue
-                word = VERDICTS[pair.verdict]
+                word = WORDS[pair.verdict]
                 if pair.better is not None:
                     word = "better" if pair.better == contender.key else "worse"
                 cells = (

@@ -67,7 +67,7 @@ def time_us(row: Mapping[str, Any], key: str) -> str:
 
 
 def between(low: object, high: object, digits: int, scale: float = 1.0) -> str:
-    """Interval in brackets; empty where there is none.
+    """Interval in brackets; empty where there is none, open where the data do not reach its upper end.
 
     Parameters
     ----------
@@ -77,6 +77,8 @@ def between(low: object, high: object, digits: int, scale: float = 1.0) -> str:
     scale : float
         From the unit of the ends to the shown one.
     """
+    if high == math.inf:
+        return f"[{number(low, digits, scale)}, ∞)"
     ends = number(low, digits, scale), number(high, digits, scale)
     return "" if UNDEFINED in ends else f"[{ends[0]}, {ends[1]}]"
 

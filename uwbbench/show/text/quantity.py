@@ -70,7 +70,13 @@ class Quantity:
         """Value with unit, interval and count, or why there is none."""
         if math.isnan(estimate.value):
             return "undefined"
-        return f"{self.value_of(estimate)}, n = {estimate.n} {self.samples}, {estimate.groups} groups"
+        return f"{self.value_of(estimate)}, n = {estimate.n} {self.samples}, {_scenes(estimate)}"
+
+
+def _scenes(estimate: Estimate) -> str:
+    """How many scenes are behind an estimate, and what its interval says."""
+    counted = "1 scene" if estimate.groups == 1 else f"{estimate.groups} scenes"
+    return f"{counted}; interval within these recordings only" if estimate.within else counted
 
 
 def undefined_titles(metrics: Mapping[str, type[Metric]]) -> str:

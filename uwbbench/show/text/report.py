@@ -7,13 +7,14 @@ from pathlib import Path
 from typing import Any
 
 from uwbbench.api.text import one_line
+from uwbbench.measure.accuracy.intervals import INNER_UNITS, failing_share
 from uwbbench.measure.accuracy.metrics.choice import MetricChoice
-from uwbbench.measure.accuracy.stats import MINIMUM_GROUPS
 from uwbbench.results.report import Report
+from uwbbench.results.verdicts import WITHIN, rank_text
 from uwbbench.show.text.captures_sheets import captures_sheet, each_capture_sheet
 from uwbbench.show.text.error_sheets import cause_sheets, curve_sheets, main_causes
 from uwbbench.show.text.limits_sheets import limits_sheets
-from uwbbench.show.text.numbers import interval, number, time_us
+from uwbbench.show.text.numbers import between, interval, number, time_us
 from uwbbench.show.text.paper_sheets import paper_sheets, published_sheets
 from uwbbench.show.text.quantity import Quantity, undefined_titles
 from uwbbench.show.text.sheet import Sheet, escaped, sentence, shown
@@ -160,12 +161,15 @@ def _leaderboards(report: Report) -> Iterator[Sheet]:
             cells[1:1] = [time_us(about, "p50_us"), time_us(about, "p99_us")]
             cells += [number(about["chance_recall"], 3)] if open_world else []
             cells += [str(about["errors"]), f"{about['scored_frames']} of {about['frames']}"]
-            rows.append((shown(about["detector"]), *cells))
+            ranks = None if about["rank_low"] is None else (about["rank_low"], about["rank_high"])
+            rows.append((shown(about["detector"]), rank_text(ranks), *cells))
         title = f"{shown(dataset)}, {source.upper()}: {scoring} scoring, {TABLES[table]}"
         board = dataset, source, scoring, table
         few = [one for one in report.set_aside if (one.dataset, one.source, one.scoring, "filtering") == board]
-        notes = (*map(set_aside_warning, few), *_leaderboard_notes(members, quantities, report.metrics))
-        yield Sheet(title, ("detector", *heads, *extra), tuple(rows), notes)
+        seen = table == "mapping" and report.folder.rules[0].surface == "visible"
+        faces = ["Errors are distances to the part of an outline that the receiver can see (surface: visible)."] * seen
+        notes = (*map(set_aside_warning, few), *faces, *_leaderboard_notes(members, quantities, report.metrics))
+        yield Sheet(title, ("detector", "rank", *heads, *extra), tuple(rows), notes)
 
 
 def _leaderboard_notes(
@@ -182,11 +186,7 @@ def _leaderboard_notes(
             f"{undefined_titles(metrics)} are undefined; errors are of matches, and recall is to be read against that "
             "of random ranges."
         )
-    if all(estimates[main.name].groups < MINIMUM_GROUPS for _, estimates in members):
-        yield f"No intervals: fewer than {MINIMUM_GROUPS} groups (captures, or blocks of a second)."
-        for about, estimates in members:
-            values = ", ".join(number(value, main.digits, main.factor) for value in estimates[main.name].per_group)
-            yield f"{main.axis} of each group, {shown(about['detector'])}: {values or 'none'}"
+    yield from _evidence(members, main)
     for about, _ in members:
         if about["invalid"] or about["unprocessed"]:
             yield (
@@ -194,6 +194,27 @@ def _leaderboard_notes(
                 f"{about['unprocessed']} of them with known truth"
             )
     yield "Times hold on this machine only."
+
+
+def _evidence(members: list[tuple[dict[str, Any], Any]], main: Quantity) -> Iterator[str]:
+    """What the intervals rest on, and what the scenes do not show."""
+    scenes = max(about["scenes"] for about, _ in members)
+    what = "1 scene" if scenes == 1 else f"{scenes} scenes"
+    yield f"{what}: if none of them fails, at most {failing_share(scenes):.0%} of such scenes do (95 % confidence)."
+    if any(estimates[main.name].within for _, estimates in members):
+        yield f"Intervals: {WITHIN}."
+    elif scenes < INNER_UNITS:
+        yield f"Intervals: outer ones, as if each scene ended all or nothing; inner ones from {INNER_UNITS} scenes on."
+    else:
+        outer = "; ".join(
+            f"{shown(about['detector'])} {between(e.outer_low, e.outer_high, main.digits, main.factor)}"
+            for about, e in ((about, estimates[main.name]) for about, estimates in members)
+        )
+        yield f"Intervals: inner ones, for scenes like these. Outer ones of {main.axis}, at worst: {outer}."
+    if 1 < scenes < INNER_UNITS:
+        for about, estimates in members:
+            values = ", ".join(number(value, main.digits, main.factor) for value in estimates[main.name].per_group)
+            yield f"{main.axis} of each scene, {shown(about['detector'])}: {values or 'none'}"
 
 
 def _stability(report: Report) -> Sheet:

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from uwbbench.api.metric import Metric, Outcome
 from uwbbench.api.registry import AuthoredKind
-from uwbbench.measure.accuracy.stats import bootstrap, evaluate, merge
+from uwbbench.measure.accuracy.evidence import merge
+from uwbbench.measure.accuracy.stats import estimated, evaluate
 from uwbbench.tools.check.check import Nonconformity, check
 from uwbbench.tools.check.subject import ClassSubject
 from uwbbench.tools.check.values import Values
@@ -100,9 +101,9 @@ class MetricSubject(ClassSubject):
 
 @check(_METRIC)
 def attributes_are_valid(subject: MetricSubject) -> str:
-    """``merge`` and ``better`` are among the known words, and ``minimum_samples`` is a positive whole number."""
+    """``merge``, ``better`` and ``kind`` are known words, and ``minimum_samples`` is a positive whole number."""
     hints = get_type_hints(Metric)
-    for name in ("merge", "better"):
+    for name in ("merge", "better", "kind"):
         (choice,) = get_args(hints[name])
         value = getattr(subject.cls, name)
         if value not in get_args(choice):
@@ -184,7 +185,7 @@ def value_is_a_float(subject: MetricSubject) -> str:
     return f"{value:.4g} {subject.cls.unit}".rstrip()
 
 
-@check("uwbbench.measure.accuracy.stats.merge")
+@check("uwbbench.measure.accuracy.evidence.merge")
 def grouping_does_not_matter(subject: MetricSubject) -> None:
     """Partials that are merged in any grouping and order give one value: runs are put together in pieces."""
     cls = subject.cls
@@ -204,7 +205,7 @@ def grouping_does_not_matter(subject: MetricSubject) -> None:
 @check("uwbbench.measure.accuracy.metrics")
 def nothing_is_undefined(subject: MetricSubject) -> None:
     """Without frames the value is NaN with n = 0, no zero and no exception: 0/0 is undefined."""
-    estimate = bootstrap(subject.cls, [empty()], resamples=20)
+    estimate = estimated(subject.cls, [empty()])
     value = subject.cls.value(subject.cls.partial(empty()))
     if not math.isnan(value) or not math.isnan(estimate.value) or estimate.n:
         raise Nonconformity("NaN with n = 0", f"{value} with n = {estimate.n}")
@@ -233,26 +234,34 @@ def perfection_is_best(subject: MetricSubject) -> str:
     return f"perfect: {best:g}"
 
 
-@check("uwbbench.measure.accuracy.stats.bootstrap")
+@check("uwbbench.measure.accuracy.stats.estimated")
 def interval_brackets_the_value(subject: MetricSubject) -> str:
-    """The bootstrap interval over twelve captures is finite and holds the value."""
-    estimate = bootstrap(subject.cls, subject.outcomes, resamples=300)
+    """The interval over twelve captures holds the value."""
+    estimate = estimated(subject.cls, subject.outcomes)
     if not estimate.low <= estimate.value <= estimate.high:
         raise Nonconformity(f"an interval around {estimate.value:g}", f"{estimate.low:g} to {estimate.high:g}")
     return f"{estimate.value:.4g} in {estimate.low:.4g} to {estimate.high:.4g}, n = {estimate.n}"
 
 
-@check("uwbbench.api.metric.Metric.resampled")
-def resampling_is_the_same_number(subject: MetricSubject) -> None:
-    """A faster way to resample gives what merging the drawn partials gives."""
+@check("uwbbench.api.metric.Metric.parts")
+def kind_fits(subject: MetricSubject) -> str:
+    """The value is what its ``kind`` says: the ratio of summed parts, or a quantile of what is stacked."""
     cls = subject.cls
     partials = [cls.partial(one) for one in subject.outcomes]
-    counts = np.random.default_rng(7).multinomial(CAPTURES, [1 / CAPTURES] * CAPTURES, size=20)
-    fast = np.asarray(cls.resampled(partials, counts))
-    plain = Metric.resampled.__func__(cls, partials, counts)  # type: ignore[attr-defined]
-    if fast.shape != plain.shape or not np.allclose(fast, plain, rtol=1e-9, atol=1e-12, equal_nan=True):
-        worst = float(np.nanmax(np.abs(fast - plain))) if fast.shape == plain.shape else math.nan
-        raise Nonconformity("the values of merged partials", f"shape {fast.shape}, differences up to {worst:g}")
+    if cls.kind == "quantile":
+        expected = float(np.quantile(np.abs(merge(cls, partials)), cls.level)) if 0 <= cls.level <= 1 else math.nan
+    elif cls.kind in ("share", "ratio", "mean"):
+        num, den = np.sum([cls.parts(part) for part in partials], axis=0)
+        expected = float(num / den)
+    else:
+        expected = subject.value
+    if not math.isclose(expected, subject.value, rel_tol=1e-9, abs_tol=1e-12):
+        raise Nonconformity(f"{subject.value:g}, the value", f"{expected:g} from the parts of a {cls.kind}")
+    if subject.value < 0 and cls.kind not in ("mean", "other"):
+        raise Nonconformity(f"no negative value of the kind '{cls.kind}'", f"{subject.value:g}")
+    if cls.kind == "share" and subject.value > 1:
+        raise Nonconformity("a share of 1 or less", f"{subject.value:g}")
+    return str(cls.kind)
 
 
 @check("uwbbench.api.metric.Outcome")
@@ -289,7 +298,7 @@ CHECKS = (
     nothing_is_undefined,
     perfection_is_best,
     interval_brackets_the_value,
-    resampling_is_the_same_number,
+    kind_fits,
     errors_that_are_nan_are_left_out,
     open_truth_is_fine,
 )

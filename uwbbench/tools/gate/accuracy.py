@@ -26,7 +26,7 @@ from uwbbench.api.errors import ScoringError
 from uwbbench.api.metric import Metric, Outcome
 from uwbbench.config.source import CaptureRef
 from uwbbench.measure.accuracy.scoring import Region, ScoringRules, outcomes
-from uwbbench.measure.accuracy.stats import MINIMUM_GROUPS, Estimate, bootstrap, paired_difference
+from uwbbench.measure.accuracy.stats import Estimate, estimated, paired_difference
 from uwbbench.run.folder.tables import read_detections
 from uwbbench.tools.gate.check import Check, GateVerdict
 from uwbbench.tools.gate.config import AccuracyModel, Gate
@@ -44,14 +44,17 @@ class Found:
     sha256 : str
         Of its content.
     detections : Detections
+    scene : str
+        Scene or set-up that the capture is of.
     """
 
     capture: Capture
     sha256: str
     detections: Detections
+    scene: str
 
 
-def found_on(gate: Gate, worker: Worker, ref: CaptureRef) -> Found:
+def found_on(gate: Gate, worker: Worker, ref: CaptureRef, scene: str) -> Found:
     """Run the head on a capture.
 
     Parameters
@@ -61,6 +64,8 @@ def found_on(gate: Gate, worker: Worker, ref: CaptureRef) -> Found:
     worker : Worker
         In the environment of the head.
     ref : CaptureRef
+    scene : str
+        Scene that the capture is of.
 
     Raises
     ------
@@ -76,7 +81,7 @@ def found_on(gate: Gate, worker: Worker, ref: CaptureRef) -> Found:
         detections = read_detections(path, before_filters if candidates else None)
     if answer["sha256"] != capture.sha256:
         raise SetUpError(f"capture '{ref.name}' has another content in the environment of the head")
-    return Found(capture, capture.sha256, detections)
+    return Found(capture, capture.sha256, detections, scene)
 
 
 def accuracy_check(gate: Gate, rule: AccuracyModel, label: str, found: list[Found]) -> Check:
@@ -107,14 +112,15 @@ def accuracy_check(gate: Gate, rule: AccuracyModel, label: str, found: list[Foun
     )
     outcome = partial(_outcome, gate, rule)
     mine = [outcome(one.capture, one.detections) for one in found]
-    settings = {**gate.model.intervals.model_dump(), "seed": gate.model.seed}
+    scenes, confidence = [one.scene for one in found], gate.model.intervals.confidence
     if rule.no_worse_than is None:
-        return _limited(blank, rule, bootstrap(metric, mine, **settings))
+        return _limited(blank, rule, estimated(metric, mine, scenes, confidence=confidence))
     head_name = _name_of(gate)
     stored = StoredRun(gate.folder / rule.no_worse_than, rule.detector, head_name)
     theirs = [outcome(one.capture, stored.detections(one.capture.name, one.sha256)) for one in found]
     check = replace(blank, name=f"{name}, against {stored.detector} of {rule.no_worse_than}")
-    return _compared(check, rule, metric.better, paired_difference(metric, mine, theirs, **settings))
+    difference = paired_difference(metric, mine, theirs, scenes, confidence=confidence)
+    return _compared(check, rule, metric.better, difference)
 
 
 def _name_of(gate: Gate) -> str:
@@ -165,8 +171,8 @@ def _compared(check: Check, rule: AccuracyModel, better: str, found: Estimate) -
         return replace(
             check,
             verdict=GateVerdict.INCONCLUSIVE,
-            reason=f"worse, but {found.groups} groups are too few for an interval",
-            advice=f"gate on {MINIMUM_GROUPS} captures, or seconds of one, or more; or allow a tolerance",
+            reason=f"worse, but {found.groups} scenes are too few for an interval",
+            advice="gate on more scenes, or on captures of half a minute; or allow a tolerance",
         )
     least_loss = -found.high if better == "higher" else found.low
     if least_loss <= rule.tolerance:

@@ -19,7 +19,8 @@ from uwbbench.tools.gate.deadline import deadline_checks
 from uwbbench.tools.gate.latency import Progress, latency_checks
 from uwbbench.tools.gate.link import worker_of
 
-Listed = Mapping[str, Sequence[CaptureRef]]
+Listed = Mapping[str, Sequence[tuple[CaptureRef, str]]]
+"""Captures of each dataset, each with its scene."""
 
 
 def run_gate(gate: Gate, progress: Progress = lambda _: None) -> GateResult:
@@ -53,12 +54,14 @@ def run_gate(gate: Gate, progress: Progress = lambda _: None) -> GateResult:
     return GateResult(gate.name, gate.head.text, "" if gate.base is None else gate.base.text, tuple(checks), machine())
 
 
-def _listed(gate: Gate, checks: list[Check]) -> dict[str, list[CaptureRef]]:
+def _listed(gate: Gate, checks: list[Check]) -> dict[str, list[tuple[CaptureRef, str]]]:
     """Captures of each dataset; one that cannot list them becomes a check."""
     listed = {}
     for source in gate.datasets:
         try:
-            listed[source.label] = source.references()
+            references = source.references()
+            scenes = source.scenes([ref.name for ref in references])
+            listed[source.label] = [(ref, scenes[ref.name]) for ref in references]
         except BaseException as error:  # an adapter may raise anything; the other datasets still count
             if not by_plugin(error):
                 raise
@@ -71,11 +74,11 @@ def _timed(listed: Listed, captures: Captures) -> list[tuple[str, CaptureRef]]:
     return [
         (f"{label}, {ref.name}", ref)
         for label, refs in listed.items()
-        for ref in (refs if captures == "all" else refs[:1])
+        for ref, _ in (refs if captures == "all" else refs[:1])
     ]
 
 
-def _accuracy(gate: Gate, label: str, refs: Sequence[CaptureRef], progress: Progress) -> list[Check]:
+def _accuracy(gate: Gate, label: str, refs: Sequence[tuple[CaptureRef, str]], progress: Progress) -> list[Check]:
     """All limits of one dataset."""
     rules = [rule for rule in gate.model.accuracy if rule.dataset in (None, label)]
     if not rules:
@@ -84,7 +87,7 @@ def _accuracy(gate: Gate, label: str, refs: Sequence[CaptureRef], progress: Prog
     started = perf_counter()
     try:
         with worker_of(gate.head, gate.model.timeout_s) as worker:
-            runs = [found_on(gate, worker, ref) for ref in refs]
+            runs = [found_on(gate, worker, ref, scene) for ref, scene in refs]
     except UwbbenchError as error:
         return [
             _invalid("accuracy", f"{rule.metric} ({rule.scoring} scoring) on {label}", str(error)) for rule in rules

@@ -21,10 +21,13 @@ class Labelled:
     dataset : str
         Label of its dataset.
     capture : Capture
+    scene : str
+        Scene or set-up that it is of: captures of one scene repeat one another.
     """
 
     dataset: str
     capture: Capture
+    scene: str = ""
 
     @property
     def text(self) -> str:
@@ -79,7 +82,11 @@ def opened(sources: Iterable[DatasetSource]) -> tuple[Labelled, ...]:
     ScoringError
         If a capture has no ground truth.
     """
-    labelled = [Labelled(source.label, ref.open()) for source in sources for ref in source.references()]
+    labelled = []
+    for source in sources:
+        references = source.references()
+        scenes = source.scenes([ref.name for ref in references])
+        labelled += [Labelled(source.label, ref.open(), f"{source.label}: {scenes[ref.name]}") for ref in references]
     for one in labelled:
         if one.capture.truth is None:
             raise ScoringError(f"{one.text}: has no ground truth, so nothing can be tuned or shown on it")

@@ -15,7 +15,7 @@ from uwbbench.config.rules import IntervalModel
 from uwbbench.detect.pipeline import Pipeline
 from uwbbench.measure.accuracy.metrics.detection import F1
 from uwbbench.measure.accuracy.scoring import ScoringRules, outcomes
-from uwbbench.measure.accuracy.stats import Estimate, bootstrap
+from uwbbench.measure.accuracy.stats import Estimate, estimated
 from uwbbench.tools.tune.captures import Labelled
 from uwbbench.tools.tune.sweep.scores import RATIOS, SetScores, set_scores
 from uwbbench.tools.tune.sweep.sweep import Swept
@@ -32,7 +32,7 @@ class Result:
     scores : SetScores
         Of one set.
     f1 : Estimate or None
-        F1 with its interval over captures; None where it was not asked for.
+        F1 with its interval over scenes; None where it was not asked for.
     """
 
     captures: int
@@ -112,21 +112,21 @@ def scores_of_sets(swept: Swept, one: Labelled, rules: ScoringRules) -> SetScore
     return SetScores.stacked([scores_of(_judged(swept.detections(index), one, rules, "filtering")) for index in sets])
 
 
-def result_of(found: Sequence[Outcome], intervals: IntervalModel | None, seed: int = 0) -> Result:
+def result_of(found: Sequence[Outcome], scenes: Sequence[str], intervals: IntervalModel | None) -> Result:
     """Result over all outcomes together, with an interval where one is asked for.
 
     Parameters
     ----------
     found : sequence of Outcome
         One a capture.
+    scenes : sequence of str
+        Scene of each: captures of one scene repeat one another.
     intervals : IntervalModel or None
         How the interval of F1 is estimated; None for no interval.
-    seed : int
-        Of the resampling.
     """
     estimate = None
     if intervals is not None:
-        estimate = bootstrap(F1, found, resamples=intervals.resamples, confidence=intervals.confidence, seed=seed)
+        estimate = estimated(F1, found, scenes, confidence=intervals.confidence)
     frames = sum(len(outcome.tp) for outcome in found)
     return Result(len(found), frames, SetScores.merged([scores_of(outcome) for outcome in found]), estimate)
 

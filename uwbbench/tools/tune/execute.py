@@ -194,7 +194,8 @@ def _concluded(
         if not captures:
             return [None, None]
         judged = [outcomes_of(one, captures, tuning.rules, tuning.model.table) for one in (before, after)]
-        return [result_of(one, tuning.model.intervals, tuning.model.seed) for one in judged]
+        scenes = [one.scene for one in captures]
+        return [result_of(one, scenes, tuning.model.intervals) for one in judged]
 
     own_before, own_after = results(group.tuning)
     assert own_before is not None  # noqa: S101

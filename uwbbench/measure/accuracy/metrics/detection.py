@@ -14,22 +14,16 @@ Conventions
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import ClassVar, Literal
 
 import numpy as np
 
 from uwbbench.api.arrays import FloatArray
-from uwbbench.api.metric import Metric, Outcome
+from uwbbench.api.metric import Kind, Metric, Outcome
 
 
 def _ratio(part: float, whole: float) -> float:
     return float(part / whole) if whole > 0 else math.nan
-
-
-def _ratios(part: FloatArray, whole: FloatArray) -> FloatArray:
-    """Ratios (resamples,), NaN where they are undefined."""
-    return np.asarray(np.divide(part, whole, out=np.full(len(part), math.nan), where=whole > 0))
 
 
 class Precision(Metric):
@@ -44,6 +38,7 @@ class Precision(Metric):
     """
 
     title: ClassVar[str] = "precision"
+    kind: ClassVar[Kind] = "share"
     needs_exhaustive_truth: ClassVar[bool] = True
     default: ClassVar[bool] = True
     order: ClassVar[int] = 10
@@ -62,10 +57,10 @@ class Precision(Metric):
         return _ratio(tp, tp + fp)
 
     @classmethod
-    def resampled(cls, partials: Sequence[FloatArray], counts: FloatArray) -> FloatArray:
-        """Precisions of many resamples."""
-        tp, fp = (counts @ np.stack(partials)).T
-        return _ratios(tp, tp + fp)
+    def parts(cls, partial: FloatArray) -> tuple[float, float]:
+        """True positives among all positives."""
+        tp, fp = partial.tolist()
+        return tp, tp + fp
 
 
 class Recall(Metric):
@@ -78,6 +73,7 @@ class Recall(Metric):
     """
 
     title: ClassVar[str] = "recall"
+    kind: ClassVar[Kind] = "share"
     default: ClassVar[bool] = True
     order: ClassVar[int] = 20
     headline: ClassVar[int | None] = 2
@@ -94,10 +90,10 @@ class Recall(Metric):
         return _ratio(tp, tp + fn)
 
     @classmethod
-    def resampled(cls, partials: Sequence[FloatArray], counts: FloatArray) -> FloatArray:
-        """Recalls of many resamples."""
-        tp, fn = (counts @ np.stack(partials)).T
-        return _ratios(tp, tp + fn)
+    def parts(cls, partial: FloatArray) -> tuple[float, float]:
+        """True positives among all that was there."""
+        tp, fn = partial.tolist()
+        return tp, tp + fn
 
 
 class F1(Metric):
@@ -114,6 +110,7 @@ class F1(Metric):
     """
 
     title: ClassVar[str] = "F1"
+    kind: ClassVar[Kind] = "share"
     needs_exhaustive_truth: ClassVar[bool] = True
     default: ClassVar[bool] = True
     order: ClassVar[int] = 30
@@ -133,10 +130,10 @@ class F1(Metric):
         return _ratio(2 * tp, 2 * tp + fp + fn)
 
     @classmethod
-    def resampled(cls, partials: Sequence[FloatArray], counts: FloatArray) -> FloatArray:
-        """F1 of many resamples."""
-        tp, fp, fn = (counts @ np.stack(partials)).T
-        return _ratios(2 * tp, 2 * tp + fp + fn)
+    def parts(cls, partial: FloatArray) -> tuple[float, float]:
+        """Twice the true positives, and all counts."""
+        tp, fp, fn = partial.tolist()
+        return 2 * tp, 2 * tp + fp + fn
 
 
 class FalseAlarmsPerMinute(Metric):
@@ -149,6 +146,7 @@ class FalseAlarmsPerMinute(Metric):
     """
 
     title: ClassVar[str] = "false alarms"
+    kind: ClassVar[Kind] = "ratio"
     unit: ClassVar[str] = "1/min"
     better: ClassVar[Literal["higher", "lower", "zero"]] = "lower"
     needs_exhaustive_truth: ClassVar[bool] = True
@@ -170,7 +168,7 @@ class FalseAlarmsPerMinute(Metric):
         return _ratio(60 * fp, seconds)
 
     @classmethod
-    def resampled(cls, partials: Sequence[FloatArray], counts: FloatArray) -> FloatArray:
-        """Rates of many resamples."""
-        fp, seconds = (counts @ np.stack(partials)).T
-        return _ratios(60 * fp, seconds)
+    def parts(cls, partial: FloatArray) -> tuple[float, float]:
+        """False positives a minute, and seconds."""
+        fp, seconds = partial.tolist()
+        return 60 * fp, seconds

@@ -17,13 +17,12 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Sequence
 from typing import ClassVar, Literal
 
 import numpy as np
 
-from uwbbench.api.arrays import FloatArray, IntArray
-from uwbbench.api.metric import Metric, Outcome
+from uwbbench.api.arrays import FloatArray
+from uwbbench.api.metric import Kind, Metric, Outcome
 from uwbbench.measure.accuracy.stats import samples_needed
 
 
@@ -50,6 +49,11 @@ class _ErrorMetric(Metric):
         """Signed errors (n,) of the detections that have one."""
         return np.asarray(outcome.error_m[np.isfinite(outcome.error_m)])
 
+    @classmethod
+    def most(cls, partial: FloatArray) -> float:
+        """Largest absolute error."""
+        return float(np.abs(partial).max(initial=0.0))
+
 
 class MeanAbsoluteError(_ErrorMetric):
     """Mean of the absolute errors.
@@ -62,6 +66,7 @@ class MeanAbsoluteError(_ErrorMetric):
 
     title: ClassVar[str] = "MAE"
     default: ClassVar[bool] = True
+    kind: ClassVar[Kind] = "ratio"
     order: ClassVar[int] = 40
     headline: ClassVar[int | None] = 3
 
@@ -71,9 +76,9 @@ class MeanAbsoluteError(_ErrorMetric):
         return float(np.mean(np.abs(partial))) if len(partial) else math.nan
 
     @classmethod
-    def resampled(cls, partials: Sequence[FloatArray], counts: FloatArray) -> FloatArray:
-        """Mean absolute errors of many resamples, from the sums of the groups."""
-        return _mean(counts, [np.abs(part).sum() for part in partials], partials)
+    def parts(cls, partial: FloatArray) -> tuple[float, float]:
+        """Sum and number of the absolute errors."""
+        return float(np.abs(partial).sum()), float(len(partial))
 
 
 class MatchedMeanAbsoluteError(MeanAbsoluteError):
@@ -100,47 +105,6 @@ class _Percentile(_ErrorMetric):
             return math.nan
         return float(np.quantile(np.abs(errors_m), quantile))
 
-    @staticmethod
-    def drawn_at(quantile: float, partials: Sequence[FloatArray], counts: FloatArray) -> FloatArray:
-        """Quantile (resamples,) of drawn groups: the same numbers as :meth:`at`, with one sort for all draws."""
-        sizes = np.array([len(part) for part in partials])
-        errors_m = np.abs(np.concatenate(partials))
-        order = np.argsort(errors_m)
-        errors_m, owner = errors_m[order], np.repeat(np.arange(len(partials)), sizes)[order]
-        samples = counts @ sizes.astype(np.float64)
-        quantiles_m = np.full(len(counts), math.nan)
-        enough = samples >= samples_needed(quantile)
-        if enough.any():
-            place = quantile * (samples[enough] - 1)
-            below = np.floor(place)
-            above = np.minimum(below + 1, samples[enough] - 1)
-            low_m, high_m = errors_m[_positions(owner, counts[enough], np.stack([below, above]))]
-            quantiles_m[enough] = low_m + (place - below) * (high_m - low_m)
-        return quantiles_m
-
-
-def _positions(owner: IntArray, counts: FloatArray, ranks: FloatArray) -> IntArray:
-    """Positions, among sorted samples, of those of some ranks (ranks, resamples) in each resample.
-
-    Each sample counts as often as the group that owns it was drawn. The samples are taken in blocks, so that only one
-    block of each resample is counted sample by sample.
-    """
-    size = max(1, math.isqrt(len(owner)))
-    blocks = -(-len(owner) // size)
-    cell = owner * blocks + np.arange(len(owner)) // size
-    held = np.bincount(cell, minlength=counts.shape[1] * blocks).reshape(-1, blocks)
-    # Single precision holds whole numbers up to 2^24, and is twice as fast.
-    exact = np.float32 if counts.shape[1] * len(owner) < 2**24 else np.float64
-    reached = counts.astype(exact) @ np.cumsum(held, axis=1).astype(exact)
-    positions = np.empty(ranks.shape, np.int64)
-    for row, rank in zip(positions, ranks, strict=True):
-        block = np.sum(reached <= rank[:, None].astype(exact), axis=1)
-        before = np.take_along_axis(reached, np.maximum(block - 1, 0)[:, None], axis=1)
-        places = np.minimum(block[:, None] * size + np.arange(size), len(owner) - 1)
-        within = np.cumsum(np.take_along_axis(counts, owner[places], axis=1), axis=1)
-        row[:] = block * size + np.sum(np.where(block[:, None] > 0, before, 0) + within <= rank[:, None], axis=1)
-    return positions
-
 
 class Percentile90(_Percentile):
     """Absolute error that nine of ten detections stay below; needs 36 samples.
@@ -153,6 +117,8 @@ class Percentile90(_Percentile):
 
     title: ClassVar[str] = "P90"
     default: ClassVar[bool] = True
+    kind: ClassVar[Kind] = "quantile"
+    level: ClassVar[float] = 0.90
     order: ClassVar[int] = 50
     minimum_samples: ClassVar[int] = samples_needed(0.90)
 
@@ -161,17 +127,14 @@ class Percentile90(_Percentile):
         """90th percentile."""
         return _Percentile.at(0.90, partial)
 
-    @classmethod
-    def resampled(cls, partials: Sequence[FloatArray], counts: FloatArray) -> FloatArray:
-        """90th percentiles of many resamples."""
-        return _Percentile.drawn_at(0.90, partials, counts)
-
 
 class Percentile95(_Percentile):
     """Absolute error that nineteen of twenty detections stay below; needs 72 samples."""
 
     title: ClassVar[str] = "P95"
     default: ClassVar[bool] = True
+    kind: ClassVar[Kind] = "quantile"
+    level: ClassVar[float] = 0.95
     order: ClassVar[int] = 60
     headline: ClassVar[int | None] = 4
     minimum_samples: ClassVar[int] = samples_needed(0.95)
@@ -180,11 +143,6 @@ class Percentile95(_Percentile):
     def value(partial: FloatArray) -> float:
         """95th percentile."""
         return _Percentile.at(0.95, partial)
-
-    @classmethod
-    def resampled(cls, partials: Sequence[FloatArray], counts: FloatArray) -> FloatArray:
-        """95th percentiles of many resamples."""
-        return _Percentile.drawn_at(0.95, partials, counts)
 
 
 class StandardDeviation(_ErrorMetric):
@@ -200,22 +158,13 @@ class StandardDeviation(_ErrorMetric):
 
     title: ClassVar[str] = "SD"
     default: ClassVar[bool] = True
+    kind: ClassVar[Kind] = "positive"
     order: ClassVar[int] = 70
 
     @staticmethod
     def value(partial: FloatArray) -> float:
         """Population standard deviation of the absolute errors."""
         return float(np.std(np.abs(partial))) if len(partial) else math.nan
-
-    @classmethod
-    def resampled(cls, partials: Sequence[FloatArray], counts: FloatArray) -> FloatArray:
-        """Standard deviations of many resamples, from the groups' sums about the mean of all."""
-        total = sum(len(part) for part in partials)
-        centre = sum(np.abs(part).sum() for part in partials) / total if total else 0.0
-        off = [np.abs(part) - centre for part in partials]  # about the mean, or the squares would swallow the spread
-        mean = _mean(counts, [part.sum() for part in off], partials)
-        square = _mean(counts, [np.square(part).sum() for part in off], partials)
-        return np.sqrt(np.maximum(square - np.square(mean), 0.0))
 
 
 class Bias(_ErrorMetric):
@@ -227,6 +176,7 @@ class Bias(_ErrorMetric):
     -0.1
     """
 
+    kind: ClassVar[Kind] = "mean"
     order: ClassVar[int] = 90
     better: ClassVar[Literal["higher", "lower", "zero"]] = "zero"
 
@@ -236,13 +186,6 @@ class Bias(_ErrorMetric):
         return float(np.mean(partial)) if len(partial) else math.nan
 
     @classmethod
-    def resampled(cls, partials: Sequence[FloatArray], counts: FloatArray) -> FloatArray:
-        """Mean signed errors of many resamples, from the sums of the groups."""
-        return _mean(counts, [part.sum() for part in partials], partials)
-
-
-def _mean(counts: FloatArray, sums: Sequence[float], partials: Sequence[FloatArray]) -> FloatArray:
-    """Mean (resamples,) of drawn groups with the given sums; NaN where a draw holds no sample."""
-    samples = (counts @ np.array([len(part) for part in partials])).astype(float)
-    samples[samples == 0] = math.nan
-    return np.asarray(counts @ np.array(sums) / samples)
+    def parts(cls, partial: FloatArray) -> tuple[float, float]:
+        """Sum and number of the signed errors."""
+        return float(partial.sum()), float(len(partial))

@@ -1,0 +1,109 @@
+"""What detectors add to a metric, scene by scene, and the interval that the metric has by its kind."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Hashable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from uwbbench.api.arrays import FloatArray
+from uwbbench.api.metric import Metric, Outcome
+from uwbbench.measure.accuracy import intervals
+from uwbbench.measure.accuracy.groups import BLOCKS, blocks_of
+from uwbbench.measure.accuracy.intervals import Blocks, Interval
+
+WITHIN_SCENES = 3
+"""Up to so many scenes, the interval is that of blocks of their captures."""
+
+SHORTEST_S = 30.0
+"""Captures that last less together are not cut into blocks, as these would be too much alike."""
+
+LEFT_OUT_PARTS = 40
+"""A metric without a form of its own is evaluated anew without each of at most so many parts of the scenes."""
+
+
+def merge(metric: type[Metric], partials: Sequence[FloatArray]) -> FloatArray:
+    """One partial from several, in the way that the metric merges."""
+    return np.sum(partials, axis=0) if metric.merge == "sum" else np.concatenate(partials)
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """What several detectors add to a metric, scene by scene.
+
+    Attributes
+    ----------
+    units : list of lists of array
+        For each detector, the partial of each scene on which any of them was scored.
+    blocks : list of lists of array
+        For each detector, the partials of four blocks of each capture, where scenes are one to three and their captures
+        long enough; else none.
+    recordings : Blocks or None
+        What ``blocks`` are blocks of.
+    """
+
+    units: list[list[FloatArray]]
+    blocks: list[list[FloatArray]]
+    recordings: Blocks | None
+
+    @classmethod
+    def of(cls, metric: type[Metric], series: Sequence[Sequence[Outcome]], scenes: Sequence[Hashable] = ()) -> Evidence:
+        """Evidence of some outcomes, for each detector one for each capture."""
+        captures = list(zip(*series, strict=True))
+        names: Sequence[Hashable] = scenes or range(len(captures))
+        members: dict[Hashable, list[int]] = {}
+        for place, (name, capture) in enumerate(zip(names, captures, strict=True)):
+            if any(len(outcome.group) for outcome in capture):
+                members.setdefault(name, []).append(place)
+        partials = [[metric.partial(outcome) for outcome in outcomes] for outcomes in series]
+        units = [[merge(metric, [parts[at] for at in places]) for places in members.values()] for parts in partials]
+        chosen = [captures[at] for places in members.values() for at in places]
+        lengths_s = [max(outcome.duration_s for outcome in capture) for capture in chosen]
+        long_enough = sum(lengths_s) >= SHORTEST_S * (1 - 1e-9)
+        cut = [blocks_of(capture) for capture in chosen] if long_enough and len(members) <= WITHIN_SCENES else []
+        if not cut or not all(cut):
+            return cls(units, [], None)
+        blocks = [[metric.partial(block) for parts in cut for block in parts[at]] for at in range(len(series))]
+        return cls(units, blocks, Blocks(len(chosen), min(lengths_s) / BLOCKS))
+
+
+def interval_of(
+    metric: type[Metric], parts: Sequence[FloatArray], value: float, confidence: float, within: Blocks | None = None
+) -> Interval:
+    """Interval of a metric from the partials of units, by what kind of number it is."""
+    if math.isnan(value):
+        return Interval(*np.full(5, np.nan))
+    if metric.kind == "quantile":
+        return intervals.quantile([np.abs(part) for part in parts], metric.level, confidence=confidence, blocks=within)
+    if metric.kind in ("positive", "other"):
+        left, weight = left_out(metric, parts, within)
+        scale: intervals.Scale = "log" if metric.kind == "positive" else "plain"
+        return intervals.of_left_out(
+            value, left, weight, scale=scale, units=len(parts), confidence=confidence, blocks=within
+        )
+    num, den = np.array([metric.parts(part) for part in parts]).T
+    if metric.kind == "share":
+        return intervals.share(num, den, confidence=confidence, blocks=within)
+    most = metric.most(merge(metric, parts))
+    return (intervals.ratio if metric.kind == "ratio" else intervals.mean)(
+        num, den, most=most, confidence=confidence, blocks=within
+    )
+
+
+def left_out(metric: type[Metric], parts: Sequence[FloatArray], within: Blocks | None) -> tuple[FloatArray, FloatArray]:
+    """Value (units,) without each unit, and what each unit weighs; of a metric without a form of its own, by parts."""
+    if metric.kind in ("share", "ratio", "mean") and parts:
+        num, den = np.array([metric.parts(part) for part in parts]).T
+        return intervals.delete_one(num, den), den
+    if within is None and len(parts) > LEFT_OUT_PARTS:
+        parts = [merge(metric, parts[at::LEFT_OUT_PARTS]) for at in range(LEFT_OUT_PARTS)]
+    without = [[part for place, part in enumerate(parts) if place != at] for at in range(len(parts))]
+    left = [metric.value(merge(metric, rest)) if rest else math.nan for rest in without]
+    return np.array(left, float), np.array([_weight(metric, part) for part in parts], float)
+
+
+def _weight(metric: type[Metric], part: FloatArray) -> float:
+    """What a unit weighs: its samples; each the same where a metric counts."""
+    return float(len(part)) if metric.merge == "stack" else 1.0
