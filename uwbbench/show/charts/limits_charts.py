@@ -17,12 +17,6 @@ if TYPE_CHECKING:
 USUAL = 0.9
 """Probability of detection from which an error is that of nearly all echoes, and not of the lucky ones."""
 
-POWERS = "datum.label === '' ? '' : datum.value >= 0.01 ? format(datum.value, '~r') : '10' + "
-POWERS += (
-    "{'-3':'\u207b\u00b3','-4':'\u207b\u2074','-5':'\u207b\u2075','-6':'\u207b\u2076'}[round(log(datum.value) / LN10)]"
-)
-"""Label of a rate on a logarithmic axis, at powers of ten."""
-
 
 def error_against_snr(table: pd.DataFrame, names: Mapping[str, str]) -> Spec:
     """Root-mean-square range error of each detector against SNR, above the Cramer-Rao bound.
@@ -152,9 +146,11 @@ def false_alarms(table: pd.DataFrame, names: Mapping[str, str]) -> Spec:
     look = series.encoding(legend=False)
     ends = [row[key] for row in rows for key in ("rate", "high", "asked") if row[key]]
     reach = [min(ends) / 2, max(ends) * 2]
-    powers = [10.0**power for power in range(math.ceil(math.log10(reach[0])), math.floor(math.log10(reach[1])) + 1)]
+    decades = range(math.floor(math.log10(reach[0])), math.ceil(math.log10(reach[1])) + 1)
+    steps = [first * 10.0**power for power in decades for first in (1, 2, 5)]
+    shown = {"format": PLAIN_NUMBERS, "values": [step for step in steps if reach[0] <= step <= reach[1]]}
     scale = {"type": "log", "domain": reach, "nice": False, "clamp": True}
-    across = {"scale": scale, "axis": {"labelExpr": POWERS, "values": powers}}
+    across = {"scale": scale, "axis": {**shown, "labelOverlap": "greedy", "labelSeparation": 8}}
     up = {"field": "detector", "type": "nominal", "title": None, "sort": series.detectors, "axis": {"labelLimit": 210}}
     tooltip = [{"field": "detector", "title": "Detector"}, {"field": "text", "title": "False alarms"}]
     layers: list[Spec] = [
