@@ -23,6 +23,8 @@ from uwbbench.api.arrays import FloatArray, IntArray
 from uwbbench.measure.accuracy import intervals
 from uwbbench.measure.accuracy.intervals import Interval
 from uwbbench.measure.accuracy.ranked import RankedCounts, pooled
+from uwbbench.run.folder.folder import RunFolder
+from uwbbench.run.folder.journal import Entry
 
 MOST_POINTS = 100
 
@@ -83,6 +85,27 @@ class RankedCurve:
 
 def _ends(interval: Interval) -> dict[str, Any]:
     return {"value": interval.value, "low": interval.low, "high": interval.high}
+
+
+def curves_of(folder: RunFolder, units: Sequence[Entry], confidence: float) -> dict[CurveKey, RankedCurve]:
+    """Curves of a run, of what was stored for the gate and region of its scores.
+
+    Parameters
+    ----------
+    folder : RunFolder
+    units : sequence of Entry
+        Accuracy units that were scored.
+    confidence : float
+        Of the intervals.
+    """
+    groups: dict[CurveKey, list[RankedCounts]] = defaultdict(list)
+    rules = folder.rules if units else []
+    for entry in units:
+        counts = folder.curve(entry.unit, rules[0])
+        if counts is not None:
+            groups[entry.dataset, entry.facts["source"], entry.detector].append(counts)
+    made = {key: ranked_curve(parts, confidence) for key, parts in sorted(groups.items())}
+    return {key: curve for key, curve in made.items() if curve is not None}
 
 
 def ranked_curve(
