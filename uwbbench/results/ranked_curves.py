@@ -23,6 +23,8 @@ from uwbbench.api.arrays import FloatArray, IntArray
 from uwbbench.measure.accuracy import intervals
 from uwbbench.measure.accuracy.intervals import Interval
 from uwbbench.measure.accuracy.ranked import RankedCounts, pooled
+from uwbbench.run.folder.folder import RunFolder
+from uwbbench.run.folder.journal import Entry
 
 MOST_POINTS = 100
 
@@ -85,47 +87,66 @@ def _ends(interval: Interval) -> dict[str, Any]:
     return {"value": interval.value, "low": interval.low, "high": interval.high}
 
 
-def ranked_curve(
-    parts: Sequence[RankedCounts], confidence: float, scenes: Sequence[Hashable] = ()
-) -> RankedCurve | None:
+def curves_of(folder: RunFolder, units: Sequence[Entry], confidence: float) -> dict[CurveKey, RankedCurve]:
+    """Curves of a run, of what was stored for the gate and region of its scores.
+
+    Parameters
+    ----------
+    folder : RunFolder
+    units : sequence of Entry
+        Accuracy units that were scored.
+    confidence : float
+        Of the intervals.
+    """
+    groups: dict[CurveKey, list[tuple[RankedCounts, str]]] = defaultdict(list)
+    rules = folder.rules if units else []
+    for entry in units:
+        counts = folder.curve(entry.unit, rules[0])
+        if counts is not None:
+            groups[entry.dataset, entry.facts["source"], entry.detector].append(
+                (counts, folder.scene(entry.dataset, entry.capture))
+            )
+    made = {key: ranked_curve(parts, confidence) for key, parts in sorted(groups.items())}
+    return {key: curve for key, curve in made.items() if curve is not None}
+
+
+def ranked_curve(parts: Sequence[tuple[RankedCounts, Hashable]], confidence: float) -> RankedCurve | None:
     """Curve of several captures; None where there are none, or they do not have one order.
 
     Parameters
     ----------
-    parts : sequence of RankedCounts
-        One for each capture.
+    parts : sequence of (RankedCounts, scene)
+        One for each capture, with the scene that it is of; captures of one scene repeat one another.
     confidence : float
         Of the intervals.
-    scenes : sequence
-        What each capture is of; captures of one scene repeat one another. Empty: each is of a scene of its own.
     """
-    if not parts or len({part.order for part in parts if part.order}) > 1:
+    if not parts or len({part.order for part, _ in parts if part.order}) > 1:
         return None
-    captures, members = len(parts), defaultdict[Hashable, list[RankedCounts]](list)
-    for scene, part in zip(scenes or range(captures), parts, strict=True):
+    members = defaultdict[Hashable, list[RankedCounts]](list)
+    for part, scene in parts:
         members[scene].append(part)
-    parts = [pooled(repeats) for repeats in members.values()]
-    whole = pooled(parts)
+    scenes = [pooled(repeats) for repeats in members.values()]
+    whole = pooled(scenes)
     rows = _thinned(whole)
     score = whole.score[rows]
-    tp, fp = (np.stack([_reached(part, name, score) for part in parts], axis=-1) for name in ("tp", "fp"))
-    there, minutes = np.array([part.there for part in parts]), np.array([part.duration_s / 60 for part in parts])
-    set_tp, set_fp = (np.array([getattr(part, name) for part in parts]) for name in ("set_tp", "set_fp"))
+    tp, fp = (np.stack([_reached(part, name, score) for part in scenes], axis=-1) for name in ("tp", "fp"))
+    there, minutes = np.array([part.there for part in scenes]), np.array([part.duration_s / 60 for part in scenes])
+    set_tp, set_fp = (np.array([getattr(part, name) for part in scenes]) for name in ("set_tp", "set_fp"))
     about = there, minutes, whole.exhaustive, confidence
-    alone = len(parts) == 1
-    left = [] if alone else [pooled([*parts[:at], *parts[at + 1 :]]).average_precision for at in range(len(parts))]
+    alone = len(scenes) == 1
+    left = [] if alone else [pooled([*scenes[:at], *scenes[at + 1 :]]).average_precision for at in range(len(scenes))]
     area = intervals.of_left_out(
         whole.average_precision,
         left or [math.nan],
         there if left else [0.0],
-        units=len(parts),
+        units=len(scenes),
         scale="logit",
         confidence=confidence,
     )
     return RankedCurve(
         order=whole.order,
-        captures=captures,
-        scenes=len(parts),
+        captures=len(parts),
+        scenes=len(scenes),
         average_precision=area,
         score=score,
         **_intervals(tp, fp, *about),

@@ -26,13 +26,12 @@ import numpy as np
 from uwbbench.api.errors import StoreError
 from uwbbench.config.detector import from_results, marked
 from uwbbench.measure.accuracy.metrics.choice import MetricChoice
-from uwbbench.measure.accuracy.ranked import RankedCounts
 from uwbbench.measure.accuracy.stats import Estimate
 from uwbbench.results import published
 from uwbbench.results.error_causes import ErrorCauses, error_causes
 from uwbbench.results.limits import Limits
 from uwbbench.results.pareto import speeds_of_run
-from uwbbench.results.ranked_curves import CurveKey, RankedCurve, ranked_curve
+from uwbbench.results.ranked_curves import CurveKey, RankedCurve, curves_of
 from uwbbench.results.results import Scored, errors_in, estimates_of, scenes_of, scored
 from uwbbench.results.set_aside import SetAside, set_aside
 from uwbbench.results.slices import Board
@@ -207,15 +206,9 @@ class Report:
 
         Those are left out whose candidates are not known under the rules of the scores.
         """
-        groups: dict[CurveKey, list[RankedCounts]] = defaultdict(list)
         scored = {(one.detector, one.dataset, one.capture) for one in self.scored}
-        for entry in self._of_kind("accuracy"):
-            if (entry.detector, entry.dataset, entry.capture) in scored:
-                counts = self.folder.curve(entry.unit, self.folder.rules[0])
-                if counts is not None:
-                    groups[entry.dataset, entry.facts["source"], entry.detector].append(counts)
-        made = {key: ranked_curve(parts, self.settings["confidence"]) for key, parts in sorted(groups.items())}
-        return {key: curve for key, curve in made.items() if curve is not None}
+        units = [e for e in self._of_kind("accuracy") if (e.detector, e.dataset, e.capture) in scored]
+        return curves_of(self.folder, units, self.settings["confidence"])
 
     @cached_property
     def paper_tables(self) -> pd.DataFrame:
