@@ -104,6 +104,7 @@ def test_wrong_words_for_score_are_usage_errors(uwbbench, capture: Path, words: 
     assert result.stdout == ""
 
 
+@pytest.mark.slow
 def test_of_several_receivers_one_is_chosen(uwbbench, two_receivers: Path, detector: Path) -> None:
     assert "front, rear" in uwbbench("score", two_receivers, "-d", detector, code=2).stderr
     found = json.loads(uwbbench("score", two_receivers, "-d", detector, "--receiver", "rear", "--json").stdout)

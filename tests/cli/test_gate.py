@@ -98,7 +98,7 @@ def test_a_limit_that_is_missed_is_exit_code_1_with_files_for_ci(uwbbench, make_
 def test_a_head_that_is_much_slower_is_caught_and_a_faster_one_passes(
     uwbbench, make_gate, stages, capture_file, tmp_path
 ) -> None:
-    waiting.slowed(tmp_path / "slow.yaml", 50.0, "null")
+    waiting.slowed(tmp_path / "slow.yaml", 200.0, "null")
     on_file = {"latency": ONCE, "datasets": None, "captures": f"['{capture_file}']"}
     make_gate(base="'null'", head="slow.yaml", **on_file)
     told = json.loads(uwbbench("gate", "gate.yaml", "--json", code=1).stdout)
@@ -195,10 +195,10 @@ def test_the_same_detector_is_no_worse_than_its_stored_run_and_a_worse_one_is(uw
     rule = "[{metric: f1, scoring: frame, no_worse_than: stored, detector: paper-filtering}]"
     make_gate(accuracy=rule)
     told = json.loads(uwbbench("gate", "gate.yaml", "--json").stdout)
-    assert [told["checks"][0][key] for key in ("value", "low", "high")] == [0, 0, 0]
+    assert (verdicts(told), told["checks"][0]["value"]) == (["pass"], 0)
     make_gate(head="constant", accuracy=rule)
-    worse = uwbbench("gate", "gate.yaml", code=1).stdout
-    assert "worse by more than the interval" in worse
+    worse = uwbbench("gate", "gate.yaml", code=2).stdout
+    assert "worse, but 1 scenes are too few for an interval" in worse
 
 
 def test_a_stored_run_that_was_edited_by_hand_is_invalid(uwbbench, make_gate, stored_run) -> None:
@@ -235,6 +235,7 @@ def test_validate_and_schema_know_gates(uwbbench, make_gate) -> None:
     assert "Did you mean 'minimum'?" in uwbbench("validate", "gate.yaml", code=2).stderr
 
 
+@pytest.mark.slow
 def test_a_capture_without_truth_can_be_timed_and_not_scored(uwbbench, make_gate, capture_without_truth) -> None:
     captures = f"[{capture_without_truth.name}]"
     make_gate(

@@ -129,6 +129,7 @@ def test_rescoring_with_an_impossible_gate_is_a_usage_error(uwbbench, experiment
     assert "gate_m must be positive" in uwbbench("rescore", "first", "--gate-m", 0, code=2).stderr
 
 
+@pytest.mark.slow
 def test_progress_is_shown_on_a_terminal_and_stdout_stays_pure(experiment: Path, tmp_path: Path) -> None:
     terminal, theirs = pty.openpty()
     command = [sys.executable, "-m", "uwbbench.cli", "run", "small.yaml", "--jobs", "1", "--out", "first", "--json"]

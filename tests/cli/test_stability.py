@@ -55,6 +55,7 @@ def test_single_cases_can_be_chosen(uwbbench) -> None:
     assert found["flips_float32"] is None
 
 
+@pytest.mark.slow
 def test_a_failed_case_is_exit_code_1_and_still_told(uwbbench, tmp_path) -> None:
     (tmp_path / "blind.yaml").write_text(BLIND)
     words = ("stability", "-d", "blind.yaml", "--case", "rippled-constant-frames")

@@ -45,6 +45,7 @@ def test_people_see_the_ratio_first_and_that_times_hold_here_only(uwbbench, capt
     assert "timing simple" in result.stderr
 
 
+@pytest.mark.slow
 def test_a_capture_of_a_dataset_is_named_in_brackets(uwbbench) -> None:
     found = json.loads(uwbbench("time", APPROACH, "-d", "null", "--reference", "null", "--frames", 30, "--json").stdout)
     assert found["capture"] == "approach-ch9-metal-1"
@@ -53,6 +54,7 @@ def test_a_capture_of_a_dataset_is_named_in_brackets(uwbbench) -> None:
     assert any(note.startswith("timed the first 30 of ") for note in one["notes"])
 
 
+@pytest.mark.slow
 def test_one_receiver_of_several_is_timed(uwbbench, two_receivers) -> None:
     words = ("time", two_receivers, "-d", "null", "--reference", "null")
     assert "rear" in uwbbench(*words, code=2).stderr
@@ -93,6 +95,7 @@ def test_a_capture_without_frames_is_a_mistake(uwbbench, empty_capture) -> None:
     assert "has no frames" in uwbbench("time", empty_capture, "-d", "null", code=2).stderr
 
 
+@pytest.mark.slow
 def test_all_detectors_that_can_work_on_a_capture_are_one_line_each(
     uwbbench, capture, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -44,6 +44,7 @@ def file(tmp_path: Path) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_a_tuning_leaves_detectors_all_sets_manifest_and_summary(uwbbench, file, tmp_path):
     printed = uwbbench("tune", file, "-o", "tuned").stdout
     folder = tmp_path / "tuned"

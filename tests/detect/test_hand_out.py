@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
-from tests.detect.test_pipeline import STAGES
 
+from tests.detect.pipeline.conftest import STAGES
 from uwbbench.api import Capture
 from uwbbench.detect.hand_out import DIFFERENT
 from uwbbench.detect.pipeline import Pipeline, detector_from_yaml, load_detector

@@ -121,7 +121,7 @@ def test_a_file_that_is_no_report_is_kept(made, tmp_path):
 def test_charts_are_written_as_pictures(tmp_path):
     run = uwbbench.run(SMALL | {"detectors": ["oracle"], "latency": False}, tmp_path / "run", jobs=1)  # few charts
     pictures = list(run.figures(tmp_path / "figures"))
-    assert {path.name.split("-")[0] for path in pictures} == {"range", "errors", "radargram", "map"}
+    assert {path.name.split("-")[0] for path in pictures} == {"range", "errors", "curves", "radargram", "map"}
     assert all(path.read_bytes().startswith(b"\x89PNG") for path in pictures)
 
 

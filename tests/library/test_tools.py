@@ -39,6 +39,7 @@ def capture():
     return simulated_approach(speed_m_s=3.0)
 
 
+@pytest.mark.slow
 def test_a_gate_from_a_mapping_gives_checks_with_limits():
     accuracy = [{"metric": "f1", "scoring": "frame", "minimum": 0.9}]
     plates = [{"use": "approach", "params": {"speed_m_s": 3.0}}]

@@ -42,6 +42,7 @@ def test_stored_detections_and_scores_are_those_of_a_direct_run(
     assert entry.facts["sha256"] == capture.sha256
 
 
+@pytest.mark.slow
 def test_parallel_and_serial_runs_give_the_same_scores(make_experiment: MakeExperiment, tmp_path: Path) -> None:
     experiment = make_experiment(datasets="[{use: approach, params: {speed_m_s: 3.0, runs: 3}}]")
     seen: list[Progress] = []
@@ -283,6 +284,7 @@ def test_a_detector_that_breaks_over_the_hard_cases_is_a_failed_row_and_the_othe
     assert examined["null"].facts["failed"] == 0
 
 
+@pytest.mark.slow
 def test_a_detector_that_kills_its_process_over_the_hard_cases_does_not_end_the_run(
     make_experiment: MakeExperiment, detector_file: DetectorFile, tmp_path: Path, misbehaving: Path
 ) -> None:

@@ -162,6 +162,7 @@ def test_a_parallel_run_that_is_killed_or_interrupted_can_be_continued(
     assert {entry.status for entry in folder.entries()} == {"done"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGTERM])
 def test_workers_end_with_the_run_that_started_them(
     make_experiment: MakeExperiment, detector_file: DetectorFile, tmp_path: Path, misbehaving: Path, how: signal.Signals

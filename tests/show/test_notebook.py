@@ -165,7 +165,7 @@ def test_scores_show_each_number_with_n_and_interval(approach, found):
     assert f"{scores.recall:.3f}" in text
     assert f"{scores.retained} detections" in text
     assert f"{scores.frames} frames" in text
-    assert "within this recording only" in text
+    assert "the recording is shorter than 30 s" in text
 
 
 def test_scores_show_both_tables_where_positions_are_clustered(approach, found):

@@ -137,6 +137,7 @@ def test_a_prepared_read_only_installation_is_used_by_another_user() -> None:
     assert (done.stdout, done.stderr) == ("20.0 0 1\n", "")
 
 
+@pytest.mark.slow
 def test_cold_processes_that_start_at_once_all_succeed(source: Path, tmp_path: Path) -> None:
     script = (
         "import kernels, numpy as np\nfrom uwbbench.api.compiling import compile_counts\n"

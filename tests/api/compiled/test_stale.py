@@ -118,6 +118,7 @@ def answer():
 """
 
 
+@pytest.mark.slow
 def test_fields_of_a_named_tuple_of_another_module_that_change_places_are_noticed(tmp_path: Path) -> None:
     """They are places in memory to machine code: what was compiled for the old order would give the wrong one."""
     expected = str((1.0,) * 3)

@@ -60,6 +60,7 @@ def test_a_measurement_is_complete_and_consistent() -> None:
     assert "times_us" not in found.to_dict()
 
 
+@pytest.mark.slow
 def test_frames_are_handed_out_at_a_rate_where_that_is_asked_for() -> None:
     settings = LatencyModel(reference=None, frames=10, paced_s=0.5, rate_hz=100.0)
     found = measure(REF, read_detector("null"), settings)
@@ -91,6 +92,7 @@ class Busy(Stage[Work]):
 """
 
 
+@pytest.mark.slow
 def test_a_detector_that_does_three_times_the_work_is_found_slower(
     install_plugin: Callable[..., Path], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
@@ -106,6 +108,7 @@ def test_a_detector_that_does_three_times_the_work_is_found_slower(
     assert found["ratio"] > 1.5
 
 
+@pytest.mark.slow
 def test_only_the_asked_frames_are_timed_and_that_is_said() -> None:
     found = measure(REF, read_detector("null"), LatencyModel(frames=10, reference=None))
     assert found.n == 10
@@ -113,6 +116,7 @@ def test_only_the_asked_frames_are_timed_and_that_is_said() -> None:
     assert "timed the first 10 of 45 frames" in found.notes
 
 
+@pytest.mark.slow
 def test_parameters_by_channel_and_odd_names_reach_the_process() -> None:
     text = "schema: 1\nname: \"a\\n'b' | 10:30\"\npipeline:\n  - use: reference.constant\n    params:\n"
     text += "      range_m: {by_channel: {5: 0.5, 9: 1.5, other: 2.5}}\n"
@@ -161,6 +165,7 @@ def test_what_a_dying_process_said_is_kept() -> None:
     assert error.__notes__ == ["first\nlast words"]
 
 
+@pytest.mark.slow
 def test_a_file_of_the_current_folder_is_not_mistaken_for_a_module(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -22,7 +22,8 @@ def test_a_shipped_detector_stands_every_case(name):
     found = examine(load_detector(name))
     assert [(one.check.name, one.found) for one in found.results if one.status == "failed"] == []
     assert (found.largest_error_m or 0.0) <= 1e-9
-    assert found.usual_hits >= (0.0 if name in ("null", "constant") else 0.85)
+    # The letter of the paper, arctan(Q/I), cannot tell opposite phases apart, and loses echoes by the filter on phase.
+    assert found.usual_hits >= {"null": 0.0, "constant": 0.0, "paper-as-printed": 0.7}.get(name, 0.85)
 
 
 @pytest.mark.parametrize(

@@ -175,6 +175,7 @@ def test_the_data_for_programs_is_strict_json_with_every_pair(site: dict[str, st
             assert all(0 < pair["p_adjusted"] <= 1 for pair in board["pairs"] if pair["p_adjusted"] is not None)
 
 
+@pytest.mark.slow
 def test_the_same_runs_give_the_same_site(alice: Path, bob: Path) -> None:
     assert rendered(content_of(alice, bob)) == rendered(content_of(bob, alice))
 
