@@ -54,6 +54,7 @@ CAPTURES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("entry", ["detect_first", "detect_first_plain", "detect_all"])
 @pytest.mark.parametrize("name", CAPTURES)
 def test_the_floor_finds_what_paper_filtering_finds(library, name, entry):

@@ -28,6 +28,7 @@ CAPTURES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", CAPTURES)
 def test_the_script_keeps_the_peaks_of_paper_filtering(name):
     capture: Capture = CAPTURES[name]()
@@ -40,6 +41,7 @@ def test_the_script_keeps_the_peaks_of_paper_filtering(name):
         np.testing.assert_allclose(found[column], values, rtol=1e-3, atol=1e-4)  # the script keeps single precision
 
 
+@pytest.mark.slow
 def test_the_script_filters_by_phase_where_there_is_sts():
     capture = made.tour(400)
     expected = naive.filtering_with_sts(capture, capture.frames())
@@ -47,6 +49,7 @@ def test_the_script_filters_by_phase_where_there_is_sts():
     assert kept(expected) != kept(naive.filtering(capture, capture.frames()))
 
 
+@pytest.mark.slow
 def test_the_script_maps_the_points_and_clusters_of_paper():
     capture = made.tour(700)
     expected, mapper = naive.mapping(capture, capture.frames())

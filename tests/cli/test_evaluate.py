@@ -16,6 +16,7 @@ BLOCK = {"precision", "recall", "f1", "mae_m", "p90_m", "p95_m", "sd_m", "tp", "
 # score
 
 
+@pytest.mark.slow
 def test_score_json_prints_one_object_and_nothing_else(uwbbench, capture: Path, detector: Path) -> None:
     result = uwbbench("score", capture, "--detector", detector, "--json")
     found = json.loads(result.stdout, parse_constant=pytest.fail)
@@ -70,6 +71,7 @@ def test_a_capture_without_truth_cannot_be_scored(uwbbench, capture_without_trut
     assert "blind.h5: the capture has no ground truth" in result.stderr
 
 
+@pytest.mark.slow
 def test_captures_with_invalid_frames_or_none_are_scored(uwbbench, capture_with_nan, empty_capture, detector) -> None:
     for path, frames in ((capture_with_nan, 37), (empty_capture, 0)):
         result = uwbbench("score", path, "-d", detector, "--json")

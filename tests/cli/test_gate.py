@@ -95,6 +95,7 @@ def test_a_limit_that_is_missed_is_exit_code_1_with_files_for_ci(uwbbench, make_
     assert lines[:2] == ["before", "## Gate strict\\|&lt;b&gt;: REGRESSION"]
 
 
+@pytest.mark.slow
 def test_a_head_that_is_much_slower_is_caught_and_a_faster_one_passes(
     uwbbench, make_gate, stages, capture_file, tmp_path
 ) -> None:
@@ -124,6 +125,7 @@ def test_two_environments_take_turns_in_fresh_pairs_of_processes(uwbbench, make_
     assert python in told["base"]
 
 
+@pytest.mark.slow
 def test_a_base_that_differs_from_itself_is_exit_code_3_and_the_head_is_not_measured(
     uwbbench, make_gate, stages, capture_file, tmp_path
 ) -> None:
@@ -141,6 +143,7 @@ def test_a_base_that_differs_from_itself_is_exit_code_3_and_the_head_is_not_meas
     assert "not measured" in head["reason"]
 
 
+@pytest.mark.slow
 def test_too_few_frames_are_inconclusive_and_exit_code_2(uwbbench, make_gate, capture) -> None:
     make_gate(latency=ONCE, base="paper-filtering", datasets=None, captures=f"[{capture.name}]")
     done = uwbbench("gate", "gate.yaml", code=2)
@@ -148,6 +151,7 @@ def test_too_few_frames_are_inconclusive_and_exit_code_2(uwbbench, make_gate, ca
     assert "INCONCLUSIVE (exit code 2)" in done.stdout
 
 
+@pytest.mark.slow
 def test_missed_deadlines_are_counted_with_bursts(uwbbench, make_gate, stages, tmp_path) -> None:
     waiting.slowed(tmp_path / "slow.yaml", 2000.0)
     make_gate(head="slow.yaml", deadline="{rate_hz: 1000, maximum_burst: 3, frames: 60, warmup_windows: 2}")
@@ -158,6 +162,7 @@ def test_missed_deadlines_are_counted_with_bursts(uwbbench, make_gate, stages, t
     assert burst["value"] > 50
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("keys", "reason"),
     [
@@ -176,6 +181,7 @@ def test_what_cannot_be_measured_is_exit_code_3_and_says_why(uwbbench, make_gate
     assert "<error " in Path("gate.xml").read_text()
 
 
+@pytest.mark.slow
 def test_a_detector_that_crashes_is_invalid_for_every_check(uwbbench, make_gate, stages, tmp_path) -> None:
     text = waiting.slowed(tmp_path / "crash.yaml", 0.0).read_text()
     (tmp_path / "crash.yaml").write_text(text.replace("test.wait", "test.crash"))
@@ -201,6 +207,7 @@ def test_the_same_detector_is_no_worse_than_its_stored_run_and_a_worse_one_is(uw
     assert "worse, but 1 scenes are too few for an interval" in worse
 
 
+@pytest.mark.slow
 def test_a_stored_run_that_was_edited_by_hand_is_invalid(uwbbench, make_gate, stored_run) -> None:
     import pyarrow as pa
     import pyarrow.parquet as pq

@@ -27,6 +27,7 @@ def test_each_kind_is_drawn_from_a_capture(uwbbench, capture, kind, tmp_path):
     assert (tmp_path / "made.png").read_bytes().startswith(b"\x89PNG")
 
 
+@pytest.mark.slow
 def test_kinds_without_samples_are_drawn_from_a_run_folder(uwbbench, run, tmp_path):
     for kind in ("properties", "pipeline", "cdf", "map"):
         uwbbench("plot", kind, run, "--detector", "paper", "-o", f"{kind}.svg")

@@ -54,6 +54,7 @@ def test_texts_go_to_the_terminal_where_no_file_is_named(uwbbench, run: Path) ->
     assert json.loads(uwbbench("report", "run", "--format", "json").stdout)["leaderboard"]
 
 
+@pytest.mark.slow
 def test_figures_are_written(uwbbench, run: Path, tmp_path: Path) -> None:
     assert "figures written to figures" in uwbbench("report", "run", "--figures", "figures").stderr
     names = {path.name for path in (tmp_path / "figures").iterdir()}

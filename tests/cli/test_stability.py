@@ -17,6 +17,7 @@ pipeline:
 """
 
 
+@pytest.mark.slow
 def test_all_cases_are_told_for_people(uwbbench) -> None:
     out = uwbbench("stability", "--detector", "paper-filtering").stdout
     for case in all_cases():

@@ -26,6 +26,7 @@ def test_json_holds_every_number_and_every_call(uwbbench, capture, detector) -> 
         assert {"versions", "cpu", "cores", "governor"} <= set(one["machine"])
 
 
+@pytest.mark.slow
 def test_people_see_the_ratio_first_and_that_times_hold_here_only(uwbbench, capture, detector) -> None:
     result = uwbbench("time", capture, "-d", detector, "--paced", 0.1)
     out = result.stdout

@@ -63,6 +63,7 @@ def test_a_tuning_leaves_detectors_all_sets_manifest_and_summary(uwbbench, file,
     assert "| concrete | 9 |" in (folder / "summary.md").read_text()
 
 
+@pytest.mark.slow
 def test_tuned_thresholds_are_a_detector_that_can_be_run_and_tells_what_it_was_tuned_on(uwbbench, file, tmp_path):
     result = json.loads(uwbbench("tune", file, "-o", "tuned", "--json").stdout)
     group = result["groups"][0]

@@ -18,6 +18,7 @@ class Broken(Stage):
 YAML = "schema: 1\nname: broken\npipeline:\n  - {use: broken}\n"
 
 
+@pytest.mark.slow
 def test_a_second_process_loads_what_the_first_compiled(shell, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "kernels.py").write_text(
         "from uwbbench.api.compiling import compiled\n\n\n@compiled\ndef first(samples):\n    return samples[0, 0]\n"

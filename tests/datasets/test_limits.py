@@ -111,6 +111,7 @@ def test_signals_that_make_no_sense_are_refused(params: dict[str, object], messa
         open_dataset("limits", params, [])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("snr_db", "expected_cm"), [(20, 1.16), (25, 0.65), (30, 0.41)])
 def test_subsample_ranges_reach_the_accuracy_of_the_log_parabola(snr_db: float, expected_cm: float) -> None:
     error_m = errors_m("paper-subsample", signal(scene="echo", snr_db=snr_db, frames=4000))

@@ -118,6 +118,7 @@ def test_a_file_that_is_no_report_is_kept(made, tmp_path):
         made.report(tmp_path / "thesis.md")
 
 
+@pytest.mark.slow
 def test_charts_are_written_as_pictures(tmp_path):
     run = uwbbench.run(SMALL | {"detectors": ["oracle"], "latency": False}, tmp_path / "run", jobs=1)  # few charts
     pictures = list(run.figures(tmp_path / "figures"))

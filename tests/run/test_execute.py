@@ -118,6 +118,7 @@ def test_an_exception_of_a_stage_is_a_failed_row_with_its_traceback(
     assert {entry.detector for entry in folder.entries() if entry.status == "done"} == {"oracle"}
 
 
+@pytest.mark.slow
 def test_a_stage_that_kills_its_process_fails_alone(
     make_experiment: MakeExperiment, detector_file: DetectorFile, tmp_path: Path, misbehaving: Path
 ) -> None:

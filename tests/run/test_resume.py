@@ -130,6 +130,7 @@ def test_an_interrupted_serial_run_keeps_what_was_finished(make_experiment: Make
     assert len(seen) == 4
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGINT])
 def test_a_parallel_run_that_is_killed_or_interrupted_can_be_continued(
     make_experiment: MakeExperiment, detector_file: DetectorFile, tmp_path: Path, misbehaving: Path, how: signal.Signals

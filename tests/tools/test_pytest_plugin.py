@@ -40,6 +40,7 @@ def run_pytest(folder: Path, *words: str) -> str:
     return done.stdout
 
 
+@pytest.mark.slow
 def test_results_go_into_pytest_benchmarks_json_with_detector_and_capture(tmp_path) -> None:
     run_pytest(tmp_path, "--benchmark-json=out.json")
     found = {one["name"]: one for one in json.loads((tmp_path / "out.json").read_text())["benchmarks"]}

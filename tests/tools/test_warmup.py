@@ -91,6 +91,7 @@ def test_the_captures_are_of_all_kinds_that_compiled_functions_tell_apart() -> N
     assert {kind[:2] for kind in kinds} == {(5, True), (5, False), (9, True), (9, False)}
 
 
+@pytest.mark.slow
 def test_a_detector_of_another_package_is_compiled_for_all_kinds_of_samples(theirs) -> None:
     (done,) = warm_up(["their-energy"])
     assert (done.detector, done.failure) == ("their-energy", None)

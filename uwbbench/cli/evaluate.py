@@ -35,7 +35,10 @@ def score(
     latency: Annotated[bool, typer.Option("--latency/--no-latency", help="Measure the time a frame takes.")] = True,
     json: options.Json = False,
 ) -> None:
-    """Score a detector on a capture with ground truth, and time it; or score a results file of any program."""
+    """Score a detector, or a results file, on a capture with truth.
+
+    A detector is timed, too; any program may have written the results file.
+    """
     import uwbbench
     from uwbbench.measure.accuracy.scoring import ScoringRules
     from uwbbench.run.folder.identity import plain

@@ -54,7 +54,7 @@ def time(
     data_dir: options.DataDir = None,
     json: options.Json = False,
 ) -> None:
-    """Measure how fast a detector answers, and how late.
+    """Measure how fast detectors answer, and how late.
 
     Each is timed in a process of its own, on one core with one thread, one frame a call, from raw samples in memory to
     rows as plain records. What travels between machines is the ratio to the reference, which takes turns with the

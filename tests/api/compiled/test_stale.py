@@ -148,6 +148,7 @@ def answer(): return chain(1.0)
 """
 
 
+@pytest.mark.slow
 def test_names_that_change_their_meaning_in_another_module_are_noticed(tmp_path: Path) -> None:
     """Neither the function nor those that it calls are edited: only which is called by which name."""
     hub = "from steps import add as first, scale as second"

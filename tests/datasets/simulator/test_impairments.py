@@ -33,6 +33,7 @@ def test_clipping_without_sts_leaves_sts_out(make_view, make_term, rng):
     assert after.sts2 is None
 
 
+@pytest.mark.slow
 @given(st.integers(2, 16), st.floats(0.1, 10.0), st.floats(1e-3, 1e3))
 @settings(max_examples=40, deadline=None)
 def test_quantised_samples_are_integers_of_the_word_length(make_view, make_term, bits, full_scale, direct):

@@ -35,6 +35,7 @@ def test_a_new_package_installs_and_its_own_tests_pass(kind, tmp_path):
     assert int(done.stdout.rpartition("\n")[0].rpartition("\n")[2].split()[0]) > 20
 
 
+@pytest.mark.slow
 def test_an_installed_package_is_listed_and_checked_by_name(tmp_path):
     environment = installed(write_package("metric", "rmse2", tmp_path), tmp_path / "site")
     for words, expected in ((("list", "metrics"), "uwbbench-rmse2 0.1.0"), (("check", "rmse2"), "0 failed, 0 error")):
