@@ -35,7 +35,7 @@ Verdict = Literal["differs", "equal", "not told apart", "too few", "undefined"]
 class Contrast(NamedTuple):
     """Differences, first minus second.
 
-    Attributes
+    Parameters
     ----------
     value, error : float array
         Difference, and its standard error.

@@ -50,7 +50,7 @@ Scale = Literal["logit", "log", "plain"]
 class Interval(NamedTuple):
     """A number, or an array of them, with its ends.
 
-    Attributes
+    Parameters
     ----------
     value : float array
     low, high : float array
@@ -69,7 +69,7 @@ class Interval(NamedTuple):
 class Blocks(NamedTuple):
     """Blocks of a few recordings, in equal number for each and recording after recording.
 
-    Attributes
+    Parameters
     ----------
     captures : int
     seconds : float

@@ -51,8 +51,8 @@ def sheets(outcome: TuneOutcome) -> list[Sheet]:
             for tuned in outcome.groups
         ),
         (
-            f"scoring '{model.scoring}' after {model.table}, gate {100 * model.gate_m:g} cm; intervals of F1 over "
-            "captures, or blocks of a second",
+            f"scoring '{model.scoring}' after {model.table}, gate {100 * model.gate_m:g} cm; intervals of F1 "
+            "over scenes",
             f"chosen: of all sets within {model.f1_tie:g} of the highest F1 on the captures tuned on, the one of "
             "lowest RMSE of all retained detections",
             *([f"stable zone: share of the sets within {model.stable_within:g} of the highest F1"] if is_grid else ()),
