@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
+from uwbbench.measure.accuracy.intervals import INNER_UNITS
 from uwbbench.results.curves import ErrorCurve, error_axis
 from uwbbench.results.slices import Slice
 from uwbbench.show.charts.chart import PLAIN_NUMBERS, Series, Spec, axis, chart
@@ -34,6 +35,8 @@ def by_range(title: str, slices: Sequence[Slice], spans: Sequence[str], names: M
         estimate = part.estimates[by.name]
         if not math.isnan(estimate.value):
             value, low, high = (by.scaled(v) for v in (estimate.value, estimate.low, estimate.high))
+            if estimate.groups < INNER_UNITS:  # the outer interval of each bin would fill the whole chart
+                low = high = math.nan
             rows.append(
                 {
                     "detector": names[part.detector],

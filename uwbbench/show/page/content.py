@@ -163,6 +163,9 @@ class Content:
         place = {board: index for index, board in enumerate(boards)}
         detectors = {name: index for index, name in enumerate(self.report.detectors)}
         materials = labels({one.material for one in self.scored})
+        # Equal values stay in this order however the reader sorts: that of the leaderboards, which breaks ties.
+        ranked = enumerate(about for about, _ in self.estimates)
+        order = {((a["dataset"], a["source"], a["scoring"], a["table"]), a["detector"]): rank for rank, a in ranked}
         rows = [
             [
                 place[one.board],
@@ -176,7 +179,7 @@ class Content:
                 one.hits > 0,
                 one.errors,
             ]
-            for one in self.slices
+            for one in sorted(self.slices, key=lambda one: order[one.board, one.detector])
         ]
         return {
             "detectors": list(self.detectors.values()),
