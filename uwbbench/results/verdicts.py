@@ -163,7 +163,7 @@ class Ranks:
             return f"{first} has {figures}"
         if not self.sets:
             what = "1 scene" if self.scenes == 1 else f"{self.scenes} scenes"
-            return f"{text}, but {what} rank nobody (six do)"
+            return f"{text}, but {what} cannot rank (six can)"
         others = [names[key] for key in self.top if key != self.order[0]]
         if self.order[0] not in self.top or not others:
             return text
