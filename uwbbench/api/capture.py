@@ -107,13 +107,14 @@ class CaptureHeader:
         return float(times[-1] - times[0] + 1 / self.radar.frame_rate_hz) if len(times) else 0.0
 
 
-_PER_FRAME = (
+PER_FRAME = (
     "first_path_index",
     "first_path_index_sts1",
     "first_path_index_sts2",
     "odometry_position_m",
     "odometry_yaw_rad",
 )
+"""Arrays of a capture that have a value for each frame and need not be there."""
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -145,7 +146,7 @@ class Capture(CaptureHeader):
     receivers: tuple[str, ...] = field(default=())
 
     def __post_init__(self) -> None:
-        lock_fields(self, ("preamble", "sts1", "sts2", *_PER_FRAME))
+        lock_fields(self, ("preamble", "sts1", "sts2", *PER_FRAME))
         if len(self.preamble.shape) != 2:
             raise CaptureError(f"capture '{self.name}': samples have shape (frames, taps), not {self.preamble.shape}")
         frames, taps = self.preamble.shape
@@ -164,7 +165,7 @@ class Capture(CaptureHeader):
             raise CaptureError(f"capture '{self.name}': radar.has_first_path disagrees with the data given")
         counts = {"timestamp_s": len(self.trajectory.timestamp_s), "position_m": len(self.trajectory.position_m)}
         counts["yaw_rad"] = len(self.trajectory.yaw_rad)
-        for name in _PER_FRAME:
+        for name in PER_FRAME:
             value = getattr(self, name)
             if value is not None:
                 counts[name] = value.shape[0]
@@ -218,7 +219,7 @@ class Capture(CaptureHeader):
         for name in ("sts1", "sts2") if sts and self.sts1 is not None else ():
             extra[name] = locked(self._rows(name, start, stop))
             valid = valid & _finite_frames(extra[name])
-        for name in _PER_FRAME:
+        for name in PER_FRAME:
             if getattr(self, name) is not None:
                 extra[name] = getattr(self, name)[start:stop]
         return Frames(
@@ -257,7 +258,7 @@ class Capture(CaptureHeader):
         digest = hashlib.sha256(json.dumps(self.radar.to_dict(), sort_keys=True).encode())
         track = self.trajectory
         arrays: list[Samples | None] = [track.timestamp_s, track.position_m, track.yaw_rad]
-        arrays += [getattr(self, name) for name in ("preamble", "sts1", "sts2", *_PER_FRAME)]
+        arrays += [getattr(self, name) for name in ("preamble", "sts1", "sts2", *PER_FRAME)]
         if self.truth is not None:
             for obstacle in self.truth.objects:
                 label = [obstacle.name, obstacle.material, obstacle.structure, self.truth.exhaustive]

@@ -1,7 +1,7 @@
 """Whose wish it is that the program ends: the user's, or that of a plugin that knows no better.
 
 A plugin may raise anything, ``SystemExit`` and ``KeyboardInterrupt`` included. What the user wishes is known from the
-signals of the operating system, which a plugin does not send.
+signals of the operating system; a plugin that sends one to its own process is taken for the user.
 """
 
 from __future__ import annotations

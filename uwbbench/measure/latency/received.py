@@ -12,17 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from uwbbench.api.capture import Capture
+from uwbbench.api.capture import PER_FRAME, Capture
 from uwbbench.api.truth import Trajectory
 
 _SAMPLES = ("preamble", "sts1", "sts2")
-_PER_FRAME = (
-    "first_path_index",
-    "first_path_index_sts1",
-    "first_path_index_sts2",
-    "odometry_position_m",
-    "odometry_yaw_rad",
-)
 
 
 def received(capture: Capture, frames: int | None = None) -> Capture:
@@ -38,7 +31,7 @@ def received(capture: Capture, frames: int | None = None) -> Capture:
     count = len(capture) if frames is None else min(frames, len(capture))
     capture.frames(0, count)  # a damaged file is named here
     parts: dict[str, Any] = {name: _copied(getattr(capture, name), count) for name in _SAMPLES if _has(capture, name)}
-    parts |= {name: getattr(capture, name)[:count] for name in _PER_FRAME if _has(capture, name)}
+    parts |= {name: getattr(capture, name)[:count] for name in PER_FRAME if _has(capture, name)}
     track = capture.trajectory
     poses = Trajectory(track.timestamp_s[:count], track.position_m[:count], track.yaw_rad[:count])
     return dataclasses.replace(capture, truth=None, trajectory=poses, **parts)
@@ -84,7 +77,7 @@ def laps(capture: Capture, frames: int, *, renumbered: bool = True) -> tuple[Cap
 def _again(capture: Capture, frames: int) -> Capture:
     parts: dict[str, Any] = {name: _Again(getattr(capture, name), frames) for name in _SAMPLES if _has(capture, name)}
     lap, place = np.divmod(np.arange(frames), len(capture))
-    parts |= {name: getattr(capture, name)[place] for name in _PER_FRAME if _has(capture, name)}
+    parts |= {name: getattr(capture, name)[place] for name in PER_FRAME if _has(capture, name)}
     track = capture.trajectory
     lap_s = float(track.timestamp_s[-1] - track.timestamp_s[0]) + 1 / capture.radar.frame_rate_hz
     poses = Trajectory(track.timestamp_s[place] + lap * lap_s, track.position_m[place], track.yaw_rad[place])
