@@ -26,7 +26,7 @@ from uwbbench.api.metric import Metric, Outcome
 from uwbbench.measure.accuracy.boards import RANKED_UNITS, Contrast, board, contrast
 from uwbbench.measure.accuracy.evidence import Evidence, interval_of, left_out, merge
 from uwbbench.measure.accuracy.groups import taken
-from uwbbench.measure.accuracy.intervals import CONFIDENCE, INNER_UNITS
+from uwbbench.measure.accuracy.intervals import CONFIDENCE, INNER_UNITS, exact
 
 
 @dataclass(frozen=True)
@@ -314,15 +314,12 @@ def clopper_pearson(successes: float, trials: float, confidence: float = 0.95) -
     >>> low, round(high, 4)
     (0.0, 0.3085)
     """
-    from scipy.special import betaincinv
-
     if not 0 <= successes <= trials:
         raise ValueError(f"{successes} successes of {trials} trials")
-    tail = (1 - confidence) / 2
-    failures = trials - successes
-    low = float(betaincinv(successes, failures + 1, tail)) if successes else 0.0
-    high = float(betaincinv(successes + 1, failures, 1 - tail)) if failures else 1.0
-    return low, high
+    if not trials:
+        return 0.0, 1.0
+    low, high = exact(np.asarray(successes / trials), np.asarray(trials), confidence)
+    return float(low), float(high)
 
 
 def clustered_proportion(successes: IntArray, trials: int, confidence: float = 0.95) -> tuple[float, float]:
