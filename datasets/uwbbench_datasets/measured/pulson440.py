@@ -315,7 +315,7 @@ class Pulson440Rail(Dataset[Pulson440RailParams]):
         tracked_s = onset_s(motion.time_s, moved_by_poses_m(motion.time_s, motion.position_m))
         if seen_s is None or tracked_s is None:
             raise CaptureError(
-                f"{path if seen_s is None else motion_path}: shows no onset of motion after {REST_S:g} s at rest, to tie "
-                "the clocks of radar and motion together; give 'time_offset_s'"
+                f"{path if seen_s is None else motion_path}: shows no onset of motion after {REST_S:g} s at rest, to "
+                "tie the clocks of radar and motion together; give 'time_offset_s'"
             )
         return tracked_s - seen_s, f"time offset {tracked_s - seen_s:.2f} s from the onset of motion"
