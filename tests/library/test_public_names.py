@@ -53,7 +53,7 @@ def test_a_name_that_does_not_exist_is_refused():
             pytest.param(order, marks=pytest.mark.slow)
             for order in (
                 "from uwbbench.run import run_experiment\nimport uwbbench",
-                "import uwbbench.cli\nimport uwbbench.run.experiment as room\nassert room.read_experiment\nimport uwbbench",
+                "import uwbbench.cli\nimport uwbbench.run.experiment as room\nassert room\nimport uwbbench",
                 "from uwbbench import run\nimport uwbbench\nimport uwbbench.run.folder\nassert run is uwbbench.run",
                 "import importlib\nimportlib.import_module('uwbbench.run')\nimport uwbbench",
                 "import uwbbench\nuwbbench.run\nfrom uwbbench.run.execute import run_experiment",
