@@ -15,7 +15,7 @@ from uwbbench.api import registry
 from uwbbench.api.errors import PluginError
 from uwbbench.config.datasets import DatasetUse
 from uwbbench.config.detector import BY_CHANNEL, DetectorModel, StepModel
-from uwbbench.run.experiment import ExperimentModel
+from uwbbench.run.experiment import ExperimentModel, ScoredDataset
 from uwbbench.tools.gate.config import GateModel
 from uwbbench.tools.tune.config import TuneModel
 
@@ -31,7 +31,7 @@ def detector_schema() -> Schema:
 
 def experiment_schema() -> Schema:
     """JSON Schema of an experiment file; each dataset's parameters follow from its ``use``."""
-    schema = _file_schema(ExperimentModel, DatasetUse, "datasets", by_channel=False)
+    schema = _file_schema(ExperimentModel, ScoredDataset, "datasets", by_channel=False)
     properties = schema["properties"]
     # The two short forms that the model accepts: `scoring: frame` and `latency: false`.
     properties["scoring"] = _or(properties["scoring"], properties["scoring"]["items"])
