@@ -11,7 +11,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, field_validator, model_validator
 
 from uwbbench.api import registry
-from uwbbench.api.errors import ConfigError, nearest
+from uwbbench.api.errors import ConfigError, UwbbenchError, nearest
 from uwbbench.api.locate import find_config
 from uwbbench.api.override import value_at
 from uwbbench.api.yaml_file import YamlFile, read_yaml
@@ -79,9 +79,8 @@ class ToleranceModel(ConfigModel):
     absolute: float | None = Field(default=None, gt=0, description="Largest difference, in the metric's own unit.")
     relative: float | None = Field(default=None, gt=0, description="Largest difference as a share of the target.")
     factor: float | None = Field(default=None, gt=1, description="Largest ratio, either way; for counts.")
-    weight: float = Field(
-        default=1.0, ge=0, description="Weight in the search; 0: shown beside, neither fitted to nor judged."
-    )
+    weight: float = Field(default=1.0, ge=0, description="Weight in the search.")
+    judged: bool = Field(default=True, description="Whether the fit answers for it, or shows it beside the others.")
 
     @model_validator(mode="after")
     def _one_kind(self) -> Self:
@@ -213,7 +212,7 @@ class Target:
     @property
     def judged(self) -> bool:
         """Whether the fit answers for it."""
-        return self.tolerance.weight > 0
+        return self.tolerance.judged
 
 
 @dataclass(frozen=True)
@@ -292,7 +291,8 @@ def read_fit(name: Given, changes: Mapping[str, Any] | None = None) -> Fit:
         with placed(source, ("robot",)):
             files[ROBOT] = find_config("robots", model.robot, path.parent).resolve()
     targets = tuple(_targets(model, cells, source))
-    start = {name: _start(name, model, files, source) for name in model.parameters}
+    contents = {label: read_yaml(file).data for label, file in files.items()}
+    start = {label: _start(label, model, contents, source) for label in model.parameters}
     _check_stages(model, source)
     made = Fit(model.name or path.stem, model, cells, targets, files, start)
     _check_paths(made, source)
@@ -333,12 +333,12 @@ def _targets(model: FitModel, cells: Mapping[str, Cell], source: YamlFile) -> li
                 if value <= 0 and tolerance.absolute is None:
                     raise ConfigError(f"{source.place(at)}: a target of {value:g} needs an absolute tolerance")
                 made.append(Target(cell, table, metric, value, tolerance))
-    if not any(target.judged for target in made):
+    if not any(target.tolerance.weight for target in made):
         raise ConfigError(f"{source.place(('tolerances',))}: all weights are 0, so that nothing is fitted")
     return made
 
 
-def _start(name: str, model: FitModel, files: Mapping[str, Path], source: YamlFile) -> Any:
+def _start(name: str, model: FitModel, files: Mapping[str, Mapping[str, Any]], source: YamlFile) -> Any:
     """Value that the search begins with."""
     free, at = model.parameters[name], ("parameters", name, "in")
     for file in free.files:
@@ -350,7 +350,7 @@ def _start(name: str, model: FitModel, files: Mapping[str, Path], source: YamlFi
             place = source.place(("parameters", name, "cells"))
             raise ConfigError(f"{place}: no cell '{pattern}'.{nearest(pattern, model.cells)}")
     with placed(source, ("parameters", name, "path")):
-        own = value_at(read_yaml(files[free.files[0]]).data, free.path, "--set")
+        own = value_at(files[free.files[0]], free.path, "--set")
     if within(free, own):
         return own
     return free.choices[0] if isinstance(free, Choices) else free.middle
@@ -365,8 +365,17 @@ def _check_stages(model: FitModel, source: YamlFile) -> None:
 
 
 def _check_paths(fit: Fit, source: YamlFile) -> None:
-    """Open every scene with each parameter changed alone, so that a path that leads nowhere is named by its line."""
-    for name, value in fit.start.items():
-        with placed(source, ("parameters", name, "path")), changed(fit.files, fit.changes({name: value})) as files:
-            for cell in fit.cells.values():
-                open_cell(files, cell, 0, 1)
+    """Open all scenes with the starting values; where that fails, with each alone, so that its line is named."""
+    try:
+        _open_all(fit, fit.start)
+    except UwbbenchError as error:
+        for name, value in fit.start.items():
+            with placed(source, ("parameters", name, "path")):
+                _open_all(fit, {name: value})
+        raise ConfigError(f"{source.name}: the scenes cannot be opened: {error}") from None
+
+
+def _open_all(fit: Fit, values: Mapping[str, Any]) -> None:
+    with changed(fit.files, fit.changes(values)) as files:
+        for cell in fit.cells.values():
+            open_cell(files, cell, 0, 1)

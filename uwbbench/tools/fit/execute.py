@@ -10,7 +10,7 @@ from typing import Any
 from uwbbench.api.errors import UwbbenchError
 from uwbbench.run.folder.identity import canonical
 from uwbbench.tools.fit.config import Cell, Fit, StageModel, matches
-from uwbbench.tools.fit.evaluate import Found, Residual, cost, distance, residual, run_cell
+from uwbbench.tools.fit.evaluate import Found, Residual, cost, residual, run_cell
 from uwbbench.tools.fit.files import Files, changed
 from uwbbench.tools.tune.config import Choices, Interval, SearchModel
 from uwbbench.tools.tune.search import require_optuna, search
@@ -201,13 +201,13 @@ class _Search:
         """Cost of a set of values."""
         values = {name: _rounded(value) for name, value in proposed.items()}
         found = {name: self.cells.found(cell, values) for name, cell in self.plan.cells.items()}
-        figures = [(target, found[target.cell].value(target)) for target in self.plan.targets if target.judged]
+        figures = [(target, found[target.cell].value(target)) for target in self.plan.targets]
         total = sum(cost(target, value) for target, value in figures)
         trial = Trial(self.seed, stage, values, total)
         self.trials.append(trial)
         if self.best is None or total < self.best.cost:
             self.best = trial
-            worst, value = max(figures, key=lambda pair: distance(*pair))
+            worst, value = max(figures, key=lambda pair: cost(*pair))
             self.said = f"best cost {total:.3f}, farthest {worst.name}: {value:.4g} for {worst.value:.4g}"
         return total
 
