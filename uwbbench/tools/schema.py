@@ -16,6 +16,7 @@ from uwbbench.api.errors import PluginError
 from uwbbench.config.datasets import DatasetUse
 from uwbbench.config.detector import BY_CHANNEL, DetectorModel, StepModel
 from uwbbench.run.experiment import ExperimentModel, ScoredDataset
+from uwbbench.tools.fit.config import FitModel
 from uwbbench.tools.gate.config import GateModel
 from uwbbench.tools.tune.config import TuneModel
 
@@ -47,6 +48,11 @@ def gate_schema() -> Schema:
 def tuning_schema() -> Schema:
     """JSON Schema of a tuning file; each dataset's parameters follow from its ``use``."""
     return _file_schema(TuneModel, DatasetUse, "datasets", by_channel=False)
+
+
+def fit_schema() -> Schema:
+    """JSON Schema of a fit file."""
+    return {"$schema": DIALECT, **FitModel.model_json_schema()}
 
 
 def scene_schema() -> Schema:
