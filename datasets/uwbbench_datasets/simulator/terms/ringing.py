@@ -59,11 +59,11 @@ class Ringing(Term[RingingParams]):
         p = self.params
         if p.taps is not None:
             delay_ns, level_db, phase_deg = np.array([[tap.delay_ns, tap.level_db, tap.phase_deg] for tap in p.taps]).T
-            self._delay_s = delay_ns * 1e-9
+            self._delay_s = np.asarray(delay_ns * 1e-9, float)
             self._level = np.asarray(10 ** (level_db / 20), float)
             self._strength = np.exp(1j * np.radians(phase_deg))
         else:
-            self._delay_s = (p.start_ns + np.arange(p.returns) * p.spacing_ns) * 1e-9
+            self._delay_s = np.asarray((p.start_ns + np.arange(p.returns) * p.spacing_ns) * 1e-9, float)
             power = 10 ** (p.level_db / 10) * np.exp(-self._delay_s / (p.decay_ns * 1e-9))
             self._level = np.asarray(np.sqrt(power), float)
             self._strength = (rng.normal(size=p.returns) + 1j * rng.normal(size=p.returns)) / np.sqrt(2)
