@@ -64,7 +64,17 @@ def scene_schema() -> Schema:
         If the dataset that reads scenes cannot be loaded.
     """
     simulator = registry.load_plugin("datasets", registry.default("dataset.scenes"))
-    return _file_schema(simulator.scene_model, simulator.term_model, "terms", by_channel=False)
+    schema = _file_schema(simulator.scene_model, simulator.term_model, "terms", by_channel=True)
+    for part in (schema, *schema["$defs"].values()):
+        own = part.get("properties", {})
+        own |= {key: _or_by_channel(value) for key, value in own.items() if _may_differ(key, value)}
+    return schema
+
+
+def _may_differ(key: str, value: Schema) -> bool:
+    """Whether a scene may give the key a value for each channel, and that is not said yet."""
+    said = any(BY_CHANNEL in one.get("properties", {}) for one in value.get("anyOf", ()))
+    return not said and "const" not in value and key not in ("schema", "name", "vary", "channel")
 
 
 def _file_schema(
