@@ -48,8 +48,8 @@ def published_sheets(report: Report) -> Iterator[Sheet]:
 def _difference(cell: Mapping[str, Any], by: Quantity) -> tuple[str, str, str]:
     """Published figure with its printed digits, the run's, and the difference with its sign and interval."""
     digits = by.digits + 1
-    ends = [cell[end] - cell["published"] for end in ("low", "high")]
-    difference = interval(cell["difference"], *ends, digits, by.factor)
+    low, high = (cell[end] - cell["published"] for end in ("low", "high"))
+    difference = interval(cell["difference"], low, high, digits, by.factor)
     signed = f"+{difference}" if cell["difference"] >= 0 else difference
     return number(cell["published"], digits, by.factor), number(cell["here"], digits, by.factor), signed
 
