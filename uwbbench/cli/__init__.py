@@ -18,6 +18,7 @@ from uwbbench.api.errors import UwbbenchError
 from uwbbench.cli import (
     data,
     evaluate,
+    fit,
     gate,
     inspection,
     leaderboard,
@@ -89,6 +90,7 @@ for _group in (
     evaluate,
     time,
     tune,
+    fit,
     gate,
     inspection,
     data,

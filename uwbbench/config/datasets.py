@@ -16,6 +16,7 @@ from uwbbench.api.errors import CaptureError, ConfigError, nearest
 from uwbbench.api.yaml_file import YamlFile
 from uwbbench.config.extends import placed
 from uwbbench.config.model import ConfigModel
+from uwbbench.config.rules import RegionModel
 from uwbbench.config.source import CaptureRef, open_dataset
 
 
@@ -65,6 +66,8 @@ class DatasetSource:
     repeats : str, tuple of tuples of str, or None
         Part of names by which repeats of a scene differ, or lists of captures that repeat one another; None where the
         dataset says it.
+    region : RegionModel or None
+        Where its captures are scored; None for the region of all.
     """
 
     label: str
@@ -73,11 +76,13 @@ class DatasetSource:
     captures: tuple[str, ...] | None = None
     roots: tuple[str, ...] = ()
     repeats: str | tuple[tuple[str, ...], ...] | None = None
+    region: RegionModel | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """As plain values, without the folders of this machine."""
-        about = {"label": self.label, "use": self.use, "params": self.params, "captures": self.captures}
-        return about if self.repeats is None else {**about, "repeats": self.repeats}
+        about: dict[str, Any] = {"label": self.label, "use": self.use, "params": self.params, "captures": self.captures}
+        about |= {} if self.repeats is None else {"repeats": self.repeats}
+        return about if self.region is None else {**about, "region": self.region.model_dump()}
 
     def scenes(self, names: Sequence[str]) -> dict[str, str]:
         """Scene or set-up of each chosen capture, by name: captures of one scene repeat one another.

@@ -23,6 +23,7 @@ from uwbbench.api.interruption import by_plugin, listening
 from uwbbench.config.detector import DetectorConfig, detector_identity, read_detector
 from uwbbench.detect.pipeline import Pipeline
 from uwbbench.detect.results_folder import ResultsFolder
+from uwbbench.measure.accuracy.scoring import ScoringRules
 from uwbbench.measure.latency.machine import machine, usable_cores
 from uwbbench.run import environment
 from uwbbench.run.experiment import Experiment
@@ -266,7 +267,11 @@ class _Run:
         return [unit for unit in self.plan.units if unit.id not in same]
 
     def _job(self, unit: Unit) -> Job:
-        return Job(unit, self.rules, self.session, os.getpid())
+        return Job(unit, self._rules(unit.dataset), self.session, os.getpid())
+
+    def _rules(self, dataset: str) -> tuple[ScoringRules, ...]:
+        """Rules of the captures of one dataset."""
+        return tuple(rule.of(dataset) for rule in self.rules)
 
     def _identity(self, unit: Unit, sha256: str) -> str:
         """Identity of a unit on a capture of this content, here and now."""
@@ -277,7 +282,7 @@ class _Run:
             detector = stored.identity(stored.content(unit.dataset, unit.ref.name))
         if unit.kind == "latency":
             return latency_identity(detector, sha256, self.experiment.latency.model_dump(), machine())
-        return accuracy_identity(detector, sha256, self.rules)
+        return accuracy_identity(detector, sha256, self._rules(unit.dataset))
 
     def _detect(self, units: list[Unit]) -> None:
         remaining = {unit.id: unit for unit in units}
@@ -303,7 +308,7 @@ class _Run:
         if finished.header is not None and finished.found is not None:
             self.folder.write_header(entry.capture_id, finished.header, finished.sha256)
             self.folder.write_detections(entry.unit, finished.found, finished.candidates)
-            self.folder.write_curve(entry.unit, finished.curve, self.rules[0])
+            self.folder.write_curve(entry.unit, finished.curve, self._rules(entry.dataset)[0])
         if finished.times_us is not None:
             self.folder.write_times(entry.unit, finished.times_us, entry.facts.get(REPORTED_FACT, {}))
         self._journal(entry)

@@ -58,6 +58,14 @@ DetectorItem = Annotated[
 ]
 
 
+class ScoredDataset(DatasetUse):
+    """Captures of one dataset, and where they are scored."""
+
+    region: RegionModel | None = Field(
+        default=None, description="Score region of these captures alone; that of the experiment if left out."
+    )
+
+
 class ExperimentModel(ConfigModel):
     """An experiment: detectors times captures, scored and timed."""
 
@@ -69,7 +77,7 @@ class ExperimentModel(ConfigModel):
     detectors: list[DetectorItem] = Field(
         min_length=1, description="Names, paths, changed detectors, or folders of results of any program."
     )
-    datasets: list[DatasetUse] = Field(min_length=1)
+    datasets: list[ScoredDataset] = Field(min_length=1)
     scoring: list[Scoring] = Field(default=["frame", "object"], min_length=1)
     gate_m: GateRadius
     region: RegionModel = Field(default_factory=RegionModel)
@@ -206,7 +214,7 @@ def read_experiment(name: Given, changes: Mapping[str, Any] | None = None, data_
         name=model.name or path.stem,
         description=model.description,
         detectors=_detectors(model, source, path.parent),
-        datasets=dataset_sources(model.datasets, source, [str(root) for root in data_roots(data_dir, path)]),
+        datasets=_datasets(model, source, [str(root) for root in data_roots(data_dir, path)]),
         scoring=tuple(model.scoring),
         gate_m=model.gate_m,
         region=model.region,
@@ -218,6 +226,11 @@ def read_experiment(name: Given, changes: Mapping[str, Any] | None = None, data_
         seed=model.seed,
         intervals=model.intervals,
     )
+
+
+def _datasets(model: ExperimentModel, source: YamlFile, roots: list[str]) -> tuple[DatasetSource, ...]:
+    sources = dataset_sources(model.datasets, source, roots)
+    return tuple(replace(one, region=use.region) for one, use in zip(sources, model.datasets, strict=True))
 
 
 def _metrics(model: ExperimentModel, source: YamlFile) -> tuple[str, ...] | dict[str, Any]:

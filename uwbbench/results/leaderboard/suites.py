@@ -139,7 +139,7 @@ def _versions(runs: Sequence[Run]) -> Iterator[tuple[str, list[Run], dict[Captur
     alike: dict[str, list[tuple[Run, dict[CaptureKey, str]]]] = defaultdict(list)
     for run in runs:
         captures = _captures(run)
-        rules = [dataclasses.asdict(rule) for rule in run.rules]
+        rules = [rule.to_dict() for rule in run.rules]
         alike[canonical([run.experiment["name"], rules, sorted(captures)])].append((run, captures))
     for members in alike.values():
         versions: list[tuple[list[Run], dict[CaptureKey, str]]] = []
@@ -166,7 +166,7 @@ def _captures(run: Run) -> dict[CaptureKey, str]:
 
 
 def _suite(name: str, runs: list[Run], captures: dict[CaptureKey, str]) -> Suite:
-    rules = [dataclasses.asdict(rule) for rule in runs[0].rules]
+    rules = [rule.to_dict() for rule in runs[0].rules]
     version = digest([sorted([*key, content] for key, content in captures.items()), rules])
     contenders: dict[tuple[str, str], Contender] = {}
     for run in runs:
