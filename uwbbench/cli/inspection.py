@@ -33,6 +33,7 @@ class File(StrEnum):
     GATE = "gate"
     TUNING = "tuning"
     FIT = "fit"
+    ROBOT = "robot"
 
 
 def list_names(
@@ -156,6 +157,7 @@ def schema(
         experiment_schema,
         fit_schema,
         gate_schema,
+        robot_schema,
         scene_schema,
         tuning_schema,
     )
@@ -167,6 +169,7 @@ def schema(
         File.GATE: gate_schema,
         File.TUNING: tuning_schema,
         File.FIT: fit_schema,
+        File.ROBOT: robot_schema,
     }
     document = makers[file]()
     if output is None:
