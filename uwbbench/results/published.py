@@ -85,8 +85,8 @@ def beside(table: pd.DataFrame, detector: str, scoring: str, datasets: Sequence[
     ------
     dict
         ``table``, ``channel``, ``material``, ``metric``; ``published``, ``here`` with Student's interval over captures
-        (``low``, ``high``) and ``difference`` (here minus published) in metres or shares, NaN where the run has no such row; ``dataset``,
-        ``source`` and ``errors`` (detections behind it), empty and 0 there.
+        (``low``, ``high``), and ``difference`` (here minus published), in metres or shares, NaN where the run has no
+        such row; ``dataset``, ``source`` and ``errors`` (detections behind it), empty and 0 there.
     """
     mine = table[(table["detector"] == detector) & (table["scoring"] == scoring)]
     order = {label: place for place, label in enumerate(datasets)}
