@@ -245,21 +245,23 @@ class Report:
 
     @cached_property
     def repeats_the_paper(self) -> bool:
-        """Whether the run covers every row of the paper's tables."""
+        """Whether the run covers every row of the paper's tables, counted as there."""
         table = self.paper_tables
-        rows = set() if table.empty else set(zip(table["channel"], table["material"], strict=True))
-        return rows >= set(published.ROWS)
+        if table.empty:
+            return False
+        alike = table[table["scoring"] == published.SCORING]
+        return set(zip(alike["channel"], alike["material"], strict=True)) >= set(published.ROWS)
 
     @cached_property
     def published(self) -> list[dict[str, Any]]:
-        """Every published cell beside that of the first detector and scoring of this run; none for other runs."""
+        """Every published cell beside that of the first detector of this run; none for other runs."""
         if not self.repeats_the_paper:
             return []
         table, datasets = self.paper_tables, [used["label"] for used in self.experiment["datasets"]]
-        scoring = next(rule.scoring for rule in self.folder.rules if rule.scoring in set(table["scoring"]))
+        table = table[table["scoring"] == published.SCORING]
         detector = next(name for name in self.detectors if name in set(table["detector"]))
-        rows = published.beside(table, detector, scoring, datasets)
-        return [{"detector": detector, "scoring": scoring} | row for row in rows]
+        rows = published.beside(table, detector, published.SCORING, datasets)
+        return [{"detector": detector, "scoring": published.SCORING} | row for row in rows]
 
     @cached_property
     def chains(self) -> pd.DataFrame:
