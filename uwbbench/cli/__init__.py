@@ -26,6 +26,7 @@ from uwbbench.cli import (
     scaffold,
     simulate,
     stability,
+    suite,
     time,
     tune,
     warmup,
@@ -98,6 +99,7 @@ for _group in (
     plot,
     warmup,
     leaderboard,
+    suite,
 ):
     _group.register(app)
 

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import itertools
+import zlib
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -129,6 +130,9 @@ class SceneModel(Params):
     vary: dict[str, Annotated[list[Any], Field(min_length=1)]] = Field(
         default_factory=dict, description="Values by path; each combination is a variant of its own."
     )
+    draw: dict[str, Annotated[list[float], Field(min_length=2, max_length=2)]] = Field(
+        default_factory=dict, description="Values by path that each run draws anew, evenly between two ends."
+    )
 
     @model_validator(mode="after")
     def _names_differ(self) -> SceneModel:
@@ -162,6 +166,25 @@ class Scene:
     model: SceneModel
     terms: tuple[tuple[TermUse, type[Term[Any]], Params], ...]
     folder: Path
+
+    def of_run(self, run: int) -> Scene:
+        """The scene with what a run draws anew; each path has a random stream of its own.
+
+        Raises
+        ------
+        ConfigError, PluginError
+            If a path leads nowhere, or to a value that may not be so.
+        """
+        if not self.model.draw:
+            return self
+        drawn = {}
+        for path, (low, high) in self.model.draw.items():
+            stream = np.random.SeedSequence(self.model.seed, spawn_key=(run, zlib.crc32(path.encode())))
+            drawn[path] = float(np.random.Generator(np.random.SFC64(stream)).uniform(low, high))
+        source = YamlFile(f"scene '{self.name}', draw", {}, {})
+        data = with_values(self.model.model_dump(by_alias=True), drawn, source.name)
+        model = checked(SceneModel, data, source)
+        return replace(self, model=model, terms=_terms(model, source))
 
     def radar(self, receiver: str) -> Radar:
         """Radar of one receiver."""
@@ -221,6 +244,7 @@ def read_scenes(path: Path, changes: Mapping[str, Any] | None = None) -> list[Sc
         parts = [f"{labels[key]}-{_text(base.vary[key], value)}" for key, value in chosen.items()]
         whole = "/".join([name, *(["_".join(parts)] if parts else [])])
         scenes.append(Scene(whole, model, _terms(model, source), path.parent))
+        scenes[-1].of_run(1)  # so that a path that leads nowhere is found before anything is simulated
     return scenes
 
 

@@ -167,7 +167,7 @@ def _captures(run: Run) -> dict[CaptureKey, str]:
 
 def _suite(name: str, runs: list[Run], captures: dict[CaptureKey, str]) -> Suite:
     rules = [dataclasses.asdict(rule) for rule in runs[0].rules]
-    version = digest([sorted([*key, content] for key, content in captures.items()), rules])
+    version = suite_version(captures, rules)
     contenders: dict[tuple[str, str], Contender] = {}
     for run in runs:
         configs = {config["name"]: config for config in run.experiment["detectors"]}
