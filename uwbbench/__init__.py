@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from uwbbench.detect.results_file import read_results
     from uwbbench.measure.accuracy.scoring import score
     from uwbbench.measure.calibration import calibrate
+    from uwbbench.tools.fit.library import fit_scene
     from uwbbench.tools.library import compare, gate, leaderboard, open_dataset, open_run, plot, run, tune
     from uwbbench.tools.stored_run import Run
 
@@ -35,6 +36,7 @@ __all__ = [
     "calibrate",
     "compare",
     "detector_from_yaml",
+    "fit_scene",
     "gate",
     "leaderboard",
     "load_detector",
@@ -60,8 +62,11 @@ _HOME = {
     "load_detector": "uwbbench.detect.pipeline",
     "read_results": "uwbbench.detect.results_file",
     "score": "uwbbench.measure.accuracy.scoring",
+    "fit_scene": "uwbbench.tools.fit.library",
     "Run": "uwbbench.tools.stored_run",
-    **dict.fromkeys(("compare", "gate", "leaderboard", "open_dataset", "open_run", "plot", "tune"), _LIBRARY),
+    **dict.fromkeys(
+        ("compare", "fit_scene", "gate", "leaderboard", "open_dataset", "open_run", "plot", "tune"), _LIBRARY
+    ),
 }
 
 

@@ -49,7 +49,7 @@ if TYPE_CHECKING:
     from uwbbench.api.radar import CHANNEL_CENTER_HZ, Radar
     from uwbbench.api.registry import load_plugin
     from uwbbench.api.stage import Filter, P, Params, Stage, ports
-    from uwbbench.api.term import Paths, Pulse, Responses, SceneObject, Term, View
+    from uwbbench.api.term import EchoFading, EchoTail, Paths, Pulse, Responses, SceneObject, Term, View
     from uwbbench.api.trial import StagesOnTrial, exact_ulps
     from uwbbench.api.truth import Obstacle, Sight, Trajectory, Truth
     from uwbbench.api.yaml_file import YamlFile, read_yaml
@@ -87,7 +87,7 @@ _HOME = {
     "radar": ("CHANNEL_CENTER_HZ", "Radar"),
     "registry": ("load_plugin",),
     "stage": ("Filter", "P", "Params", "Stage", "ports"),
-    "term": ("Paths", "Pulse", "Responses", "SceneObject", "Term", "View"),
+    "term": ("EchoFading", "EchoTail", "Paths", "Pulse", "Responses", "SceneObject", "Term", "View"),
     "trial": ("StagesOnTrial", "exact_ulps"),
     "truth": ("Obstacle", "Sight", "Trajectory", "Truth"),
     "yaml_file": ("YamlFile", "read_yaml"),
@@ -109,6 +109,8 @@ __all__ = [
     "Dataset",
     "DatasetFile",
     "Detections",
+    "EchoFading",
+    "EchoTail",
     "Evidence",
     "Filter",
     "FloatArray",

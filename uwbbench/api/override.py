@@ -50,7 +50,8 @@ def _set(data: dict[str, Any], path: str, value: Any, where: str) -> None:
         if isinstance(here, list):
             key, rest = _item(here, rest, path, where)
         elif isinstance(here, dict):
-            key, _, rest = rest.partition(".")
+            name, _, rest = rest.partition(".")
+            key = _key(here, name)
         else:
             raise ConfigError(f"{where}: '{path}' leads into a single value")
         if not rest:
@@ -61,6 +62,41 @@ def _set(data: dict[str, Any], path: str, value: Any, where: str) -> None:
                 raise ConfigError(f"{where}: '{path}': '{key}' is a single value")
             here.setdefault(key, {})
         here = here[key]
+
+
+def value_at(data: Mapping[str, Any], path: str, where: str) -> Any:
+    """Value that a path leads to, by the rules of :func:`with_values`; None where there is none yet.
+
+    Parameters
+    ----------
+    data : mapping
+        Parsed file.
+    path : str
+    where : str
+        File or option that asks for it, for messages.
+
+    Raises
+    ------
+    ConfigError
+        If an item of a list on the way is unknown.
+    """
+    here: Any = data
+    rest = path
+    while rest:
+        if isinstance(here, list):
+            index, rest = _item(here, rest, path, where)
+            here = here[index]
+        elif isinstance(here, Mapping):
+            name, _, rest = rest.partition(".")
+            here = here.get(_key(here, name))
+        else:
+            return None
+    return here
+
+
+def _key(data: Mapping[Any, Any], name: str) -> str | int:
+    """Key of a mapping as its file has it: a number, such as that of a channel, may be one there."""
+    return int(name) if name not in data and name.isdecimal() and int(name) in data else name
 
 
 def _item(items: list[Any], rest: str, path: str, where: str) -> tuple[int, str]:

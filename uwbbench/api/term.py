@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar, Generic, Literal, Protocol
 
 import numpy as np
+from pydantic import Field, model_validator
 
 from uwbbench.api.arrays import ComplexArray, FloatArray
 from uwbbench.api.capture import Capture
@@ -38,6 +39,38 @@ class Pulse(Protocol):
         """Height at the given times."""
 
 
+class EchoTail(Params):
+    """Returns from behind the face of an object: its back, its edges, what bounces inside.
+
+    They lie on the line of sight behind the point that the object's strongest echo comes from. Their power falls with
+    the depth; their phases are the object's own, the same in all runs.
+    """
+
+    level_db: float = Field(-6.0, description="Power of all returns together against the object's strongest echo.")
+    from_m: float = Field(0.2, ge=0, description="Depth of the first return behind the face.")
+    to_m: float = Field(0.5, ge=0, description="Depth of the last.")
+    returns: int = Field(4, ge=1, le=100, description="Number of returns, evenly spaced.")
+    decay_m: float = Field(0.3, gt=0, description="Depth over which the power falls by a factor e.")
+    length_m: float | None = Field(
+        None, gt=0, description="Distance over which a moving receiver sees them fade; steady if left out."
+    )
+    seed: int = Field(0, ge=0, description="Other phases for the same object.")
+
+    @model_validator(mode="after")
+    def _ordered(self) -> EchoTail:
+        if self.to_m < self.from_m:
+            raise ValueError(f"to_m ({self.to_m:g}) must not lie before from_m ({self.from_m:g})")
+        return self
+
+
+class EchoFading(Params):
+    """Slow rise and fall of an object's echo along the way of the receiver (speckle), the same in all runs."""
+
+    sd_db: float = Field(3.0, ge=0, description="Standard deviation of the level.")
+    length_m: float = Field(0.3, gt=0, description="Distance over which it becomes another.")
+    seed: int = Field(0, ge=0, description="Another pattern for the same object.")
+
+
 @dataclass(frozen=True)
 class SceneObject:
     """One object of a scene, as terms see it.
@@ -56,6 +89,13 @@ class SceneObject:
         Full sizes across the normal, along it, and upwards; a cylinder's diameter is width and depth.
     thickness_m : float or None
         Wall thickness for the reflection of a slab; None for a body that waves do not come out of again.
+    loss_db : float or None
+        What the body loses against an ideal one of its material; None for what is usual of the material.
+    fading : EchoFading or None
+    tail : EchoTail or None
+    bearing_bias_rad, bearing_sd_rad, bearing_length_m : float
+        Error of the direction that its echoes seem to come from: constant part, standard deviation of the rest, and
+        the distance over which that becomes another.
     """
 
     obstacle: Obstacle
@@ -66,6 +106,12 @@ class SceneObject:
     depth_m: float
     height_m: float
     thickness_m: float | None = None
+    loss_db: float | None = None
+    fading: EchoFading | None = None
+    tail: EchoTail | None = None
+    bearing_bias_rad: float = 0.0
+    bearing_sd_rad: float = 0.0
+    bearing_length_m: float = 0.05
 
     @property
     def name(self) -> str:
@@ -209,12 +255,17 @@ class Term(Generic[P]):
     Class attributes
     ----------------
     shared : bool
-        True where the draws belong to the robot and are the same for all of its receivers.
+        True where the draws are the same for all receivers of the robot.
+    of_robot : bool
+        True where the term models the robot itself: a robot's file may then give its parameters, and in a scene that
+        names a robot the draws of ``prepare`` follow from the robot's seed, the receiver and the channel, so that they
+        are the same in all runs and scenes. What ``paths``, ``apply`` and ``record`` draw is drawn anew in each run.
     fidelity : str
         Where the model comes from, as of a stage.
     """
 
     shared: ClassVar[bool] = False
+    of_robot: ClassVar[bool] = False
     fidelity: ClassVar[Fidelity] = "baseline"
 
     def __init__(self, params: P) -> None:

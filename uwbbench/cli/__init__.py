@@ -18,6 +18,7 @@ from uwbbench.api.errors import UwbbenchError
 from uwbbench.cli import (
     data,
     evaluate,
+    fit,
     gate,
     inspection,
     leaderboard,
@@ -90,6 +91,7 @@ for _group in (
     evaluate,
     time,
     tune,
+    fit,
     gate,
     inspection,
     data,

@@ -218,16 +218,17 @@ def receiver_text(receiver: dict[str, Any]) -> dict[str, str]:
 
 
 def checked_file(path: Path) -> str:
-    """Summary of a detector, experiment, scene, gate or tuning file that passed all checks.
+    """Summary of a detector, experiment, scene, gate, tuning or fit file that passed all checks.
 
     Raises
     ------
     ConfigError, PluginError
-        If it is wrong, or none of the five.
+        If it is wrong, or none of the six.
     """
     from uwbbench.config.source import open_dataset
     from uwbbench.detect.pipeline import load_detector
     from uwbbench.run.experiment import read_experiment
+    from uwbbench.tools.fit import read_fit
     from uwbbench.tools.gate import read_gate
     from uwbbench.tools.tune import read_tuning
 
@@ -235,6 +236,9 @@ def checked_file(path: Path) -> str:
     if "tuning" in keys:
         tuning = read_tuning(path)
         return f"tuning '{tuning.name}', {len(tuning.tuning)} datasets to tune on, fine"
+    if "cells" in keys:
+        fit = read_fit(path)
+        return f"fit '{fit.name}', {len(fit.start)} parameters, {len(fit.targets)} targets, fine"
     if "head" in keys:
         gate = read_gate(path)
         return f"gate '{gate.name}', {len(gate.datasets)} datasets, fine"
@@ -247,12 +251,12 @@ def checked_file(path: Path) -> str:
     if "terms" in keys or "trajectory" in keys:
         captures = open_dataset(registry.default("dataset.scenes"), {"scenes": [str(path.resolve())]}, ()).names()
         return f"scene of {len(captures)} captures, fine"
-    first_keys = ["pipeline", "extends", "detectors", "datasets", "terms", "head", "tuning"]
+    first_keys = ["pipeline", "extends", "detectors", "datasets", "terms", "head", "tuning", "cells"]
     near = [nearest(str(key), first_keys) for key in keys if key != "schema"]
     hint = next((text for text in near if text.startswith(" Did")), "")
     kinds = (
-        "a detector ('pipeline' or 'extends'), an experiment ('detectors'), a scene ('terms'), a gate ('head') nor a "
-        "tuning ('tuning')"
+        "a detector ('pipeline' or 'extends'), an experiment ('detectors'), a scene ('terms'), a gate ('head'), a "
+        "tuning ('tuning') nor a fit ('cells')"
     )
     raise ConfigError(f"{path}: neither {kinds}.{hint}")
 

@@ -155,7 +155,9 @@ def draw_worst(comparison: Comparison, target: Path, data_dir: Path | None) -> N
         typer.echo("note: no frame flipped, so there is no picture", err=True)
         return
     rule = next(rule for rule in comparison.first.rules if rule.scoring == comparison.scoring)
-    drawn, missing = draw_flip(comparison.worst[0], rule.region, data_roots(data_dir))
+    drawn, missing = draw_flip(
+        comparison.worst[0], rule.of(comparison.worst[0].unit.dataset).region, data_roots(data_dir)
+    )
     style.save(drawn, target)
     render.print_notes([missing] if missing else [])
     typer.echo(f"picture written to {target}", err=True)

@@ -32,6 +32,7 @@ class File(StrEnum):
     SCENE = "scene"
     GATE = "gate"
     TUNING = "tuning"
+    FIT = "fit"
 
 
 def list_names(
@@ -125,10 +126,10 @@ def _object_text(obstacle: dict[str, Any]) -> str:
 
 def validate(
     files: Annotated[
-        list[Path], typer.Argument(metavar="FILE...", help="Detector, experiment, scene, gate or tuning.")
+        list[Path], typer.Argument(metavar="FILE...", help="Detector, experiment, scene, gate, tuning or fit.")
     ],
 ) -> None:
-    """Check detector, experiment, scene, gate and tuning files. Mistakes are named with file, line and key."""
+    """Check detector, experiment, scene, gate, tuning and fit files. Mistakes are named with file, line and key."""
     from uwbbench.cli import describe
 
     wrong = False
@@ -150,7 +151,14 @@ def schema(
     ] = None,
 ) -> None:
     """Print a JSON Schema of such a file, for editors."""
-    from uwbbench.tools.schema import detector_schema, experiment_schema, gate_schema, scene_schema, tuning_schema
+    from uwbbench.tools.schema import (
+        detector_schema,
+        experiment_schema,
+        fit_schema,
+        gate_schema,
+        scene_schema,
+        tuning_schema,
+    )
 
     makers = {
         File.DETECTOR: detector_schema,
@@ -158,6 +166,7 @@ def schema(
         File.SCENE: scene_schema,
         File.GATE: gate_schema,
         File.TUNING: tuning_schema,
+        File.FIT: fit_schema,
     }
     document = makers[file]()
     if output is None:

@@ -33,8 +33,8 @@ def freeze(
     old, new = before.contents(), after.contents()
     changed = sum(old.get(label, {}).get(name) != sha for label, of in new.items() for name, sha in of.items())
     typer.echo(
-        f"{after.name} is now version {after.version[:12]}, before {before.version[:12]}: {changed} of {count} captures "
-        f"are new or changed{'' if changed else ', the scoring rules are'}; {after.path}"
+        f"{after.name} is now version {after.version[:12]}, before {before.version[:12]}: {changed} of {count} "
+        f"captures are new or changed{'' if changed else ', the scoring rules are'}; {after.path}"
     )
 
 

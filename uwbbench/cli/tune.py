@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from uwbbench.cli import options, render
+from uwbbench.cli.progress import progress
 
 if TYPE_CHECKING:
     from uwbbench.tools.tune import TuneOutcome
@@ -55,7 +53,7 @@ def tune(
     if figure is not None:
         _require_grid(tuning.sweep is not None)
     folder = new_folder(tuning.name, out)
-    with _progress(quiet) as report_progress:
+    with progress(quiet) as report_progress:
         outcome = run_tuning(tuning, report_progress)
     files = publish(outcome, folder)
     if figure is not None:
@@ -84,19 +82,6 @@ def _draw(outcome: TuneOutcome, figure: Path) -> None:
 
     style.save(draw_stable_zone(outcome), figure)
     typer.echo(f"stable zone drawn in {figure}", err=True)
-
-
-@contextmanager
-def _progress(quiet: bool) -> Iterator[Callable[[str], None]]:
-    """What is being done, in one line of stderr where that is a terminal, else nothing."""
-    if quiet or not sys.stderr.isatty():
-        yield lambda _: None
-        return
-    from rich.console import Console
-    from rich.markup import escape
-
-    with Console(stderr=True).status("starting") as line:
-        yield lambda text: line.update(escape(text))
 
 
 def _print(outcome: TuneOutcome) -> None:

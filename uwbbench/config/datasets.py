@@ -16,6 +16,7 @@ from uwbbench.api.errors import CaptureError, ConfigError, nearest
 from uwbbench.api.yaml_file import YamlFile
 from uwbbench.config.extends import placed
 from uwbbench.config.model import ConfigModel
+from uwbbench.config.rules import RegionModel
 from uwbbench.config.source import CaptureRef, open_dataset
 
 
@@ -73,6 +74,8 @@ class DatasetSource:
         Whether detectors are timed on it.
     secret : dict
         Parameters that are put over the written ones when a capture is opened, and are stored nowhere.
+    region : RegionModel or None
+        Where its captures are scored; None for the region of all.
     """
 
     label: str
@@ -85,14 +88,16 @@ class DatasetSource:
     optional: bool = False
     timed: bool = True
     secret: dict[str, Any] = field(default_factory=dict, repr=False)
+    region: RegionModel | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """As plain values, without the folders of this machine and without what is secret."""
-        about = {"label": self.label, "use": self.use, "params": self.params, "captures": self.captures}
+        about: dict[str, Any] = {"label": self.label, "use": self.use, "params": self.params, "captures": self.captures}
         about |= {} if self.repeats is None else {"repeats": self.repeats}
         about |= {} if self.at_most is None else {"at_most": self.at_most}
         about |= {"optional": True} if self.optional else {}
-        return about if self.timed else {**about, "latency": False}
+        about |= {} if self.timed else {"latency": False}
+        return about if self.region is None else {**about, "region": self.region.model_dump()}
 
     def scenes(self, names: Sequence[str]) -> dict[str, str]:
         """Scene or set-up of each chosen capture, by name: captures of one scene repeat one another.

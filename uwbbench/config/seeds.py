@@ -59,8 +59,8 @@ def read_seeds(path: Path) -> Seeds:
             mode = stat.S_IMODE(os.fstat(file.fileno()).st_mode)
             if mode & 0o077:
                 raise ConfigError(
-                    f"{path}: others may read this seed file (mode {mode:04o}), so its seeds are not secret: make a new "
-                    f"one by 'uwbbench seeds FILE', or, if nobody has read it, 'chmod 600 {path}'"
+                    f"{path}: others may read this seed file (mode {mode:04o}), so its seeds are not secret: make a "
+                    f"new one by 'uwbbench seeds FILE', or, if nobody has read it, 'chmod 600 {path}'"
                 )
             text = file.read(4096).decode("ascii", "replace").strip()
     except OSError as error:

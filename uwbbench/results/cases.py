@@ -142,7 +142,7 @@ def cases(
             of_capture = [e for e in entries if (e.dataset, e.capture) == (dataset, capture)]
             about = {"dataset": dataset, "capture": capture, "leader": leader, "which": which}
             about |= {"metric": metric, "scoring": rule.scoring}
-            yield _case(folder, of_capture, rule, score, about)
+            yield _case(folder, of_capture, rule.of(dataset), score, about)
 
 
 def _case(folder: RunFolder, entries: Sequence[Entry], rule: ScoringRules, score: float, about: dict[str, Any]) -> Case:

@@ -101,7 +101,7 @@ def curves_of(folder: RunFolder, units: Sequence[Entry], confidence: float) -> d
     groups: dict[CurveKey, list[tuple[RankedCounts, str]]] = defaultdict(list)
     rules = folder.rules if units else []
     for entry in units:
-        counts = folder.curve(entry.unit, rules[0])
+        counts = folder.curve(entry.unit, rules[0].of(entry.dataset))
         if counts is not None:
             groups[entry.dataset, entry.facts["source"], entry.detector].append(
                 (counts, folder.scene(entry.dataset, entry.capture))

@@ -87,7 +87,7 @@ def _scored(folder: RunFolder, rows: Mapping[Any, Any], rules: Sequence[ScoringR
             scene = Scene.of(detections, header)
         except ScoringError:  # its reason is in the stored scores
             continue
-        for rule in rules:
+        for rule in (one.of(entry.dataset) for one in rules):
             try:
                 tables = {name: judge(detections, scene, rule, name).outcome for name in tables_of(detections)}
             except ScoringError:

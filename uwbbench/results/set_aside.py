@@ -80,7 +80,7 @@ def set_aside(folder: RunFolder, entries: Sequence[Entry], scored: Sequence[Scor
         found = [folder.detections(units[one.detector, one.dataset, one.capture].unit) for one in members]
         if sum(map(len, found)) * (1 - MOST) <= judged:  # in the region there are no more of them
             continue
-        rule = dataclasses.replace(few[about[3]], scoring="object", strongest=None)
+        rule = dataclasses.replace(few[about[3]].of(about[1]), scoring="object", strongest=None)
         headers = [folder.header(units[one.detector, one.dataset, one.capture].capture_id) for one in members]
         every = [
             judge(detections, Scene.of(detections, header), rule, "filtering").outcome

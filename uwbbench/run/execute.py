@@ -24,6 +24,7 @@ from uwbbench.config.detector import DetectorConfig, detector_identity, read_det
 from uwbbench.config.seeds import HIDDEN
 from uwbbench.detect.pipeline import Pipeline
 from uwbbench.detect.results_folder import ResultsFolder
+from uwbbench.measure.accuracy.scoring import ScoringRules
 from uwbbench.measure.latency.machine import machine, usable_cores
 from uwbbench.run import environment
 from uwbbench.run.experiment import Experiment
@@ -276,7 +277,11 @@ class _Run:
     def _job(self, unit: Unit) -> Job:
         frozen = self.experiment.frozen
         mark = None if frozen is None else frozen.only(unit.dataset, unit.ref.name)
-        return Job(unit, self.rules, self.session, os.getpid(), mark)
+        return Job(unit, self._rules(unit.dataset), self.session, os.getpid(), mark)
+
+    def _rules(self, dataset: str) -> tuple[ScoringRules, ...]:
+        """Rules of the captures of one dataset."""
+        return tuple(rule.of(dataset) for rule in self.rules)
 
     def _identity(self, unit: Unit, sha256: str) -> str:
         """Identity of a unit on a capture of this content, here and now."""
@@ -287,7 +292,7 @@ class _Run:
             detector = stored.identity(stored.content(unit.dataset, unit.ref.name))
         if unit.kind == "latency":
             return latency_identity(detector, sha256, self.experiment.latency.model_dump(), machine())
-        return accuracy_identity(detector, sha256, self.rules)
+        return accuracy_identity(detector, sha256, self._rules(unit.dataset))
 
     def _detect(self, units: list[Unit]) -> None:
         remaining = {unit.id: unit for unit in units}
@@ -313,7 +318,7 @@ class _Run:
         if finished.header is not None and finished.found is not None:
             self.folder.write_header(entry.capture_id, finished.header, finished.sha256)
             self.folder.write_detections(entry.unit, finished.found, finished.candidates)
-            self.folder.write_curve(entry.unit, finished.curve, self.rules[0])
+            self.folder.write_curve(entry.unit, finished.curve, self._rules(entry.dataset)[0])
         if finished.times_us is not None:
             self.folder.write_times(entry.unit, finished.times_us, entry.facts.get(REPORTED_FACT, {}))
         self._journal(entry)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -20,12 +20,12 @@ from uwbbench.config.detector import DetectorConfig, read_detector
 from uwbbench.config.extends import extended, placed
 from uwbbench.config.given import Given, read_given
 from uwbbench.config.model import ConfigModel, DetectorName
-from uwbbench.config.seeds import Seeds, read_seeds
 from uwbbench.config.rules import GateRadius, IntervalModel, MetricsUse, RegionModel, Scoring, Strongest, Surface
+from uwbbench.config.seeds import Seeds, read_seeds
 from uwbbench.config.source import data_roots
 from uwbbench.measure.latency.settings import LatencyModel
 from uwbbench.run.folder.scored import rules_of
-from uwbbench.run.suite import Frozen, SuitePart, read_frozen
+from uwbbench.run.suite import WHOLE, Frozen, SuitePart, read_frozen
 
 
 class DetectorUse(ConfigModel):
@@ -61,9 +61,12 @@ DetectorItem = Annotated[
 ]
 
 
-class ExperimentDataset(DatasetUse):
-    """Captures of one dataset of an experiment."""
+class ScoredDataset(DatasetUse):
+    """Captures of one dataset, where they are scored, and whether they are timed."""
 
+    region: RegionModel | None = Field(
+        default=None, description="Score region of these captures alone; that of the experiment if left out."
+    )
     optional: bool = Field(default=False, description="Skip it, with a note, where its files are not there.")
     latency: bool = Field(default=True, description="Time detectors on it, where the experiment times them at all.")
 
@@ -87,7 +90,7 @@ class ExperimentModel(ConfigModel):
     detectors: list[DetectorItem] = Field(
         min_length=1, description="Names, paths, changed detectors, or folders of results of any program."
     )
-    datasets: list[ExperimentDataset] = Field(min_length=1)
+    datasets: list[ScoredDataset] = Field(min_length=1)
     scoring: list[Scoring] = Field(default=["frame", "object"], min_length=1)
     gate_m: GateRadius
     region: RegionModel = Field(default_factory=RegionModel)
@@ -167,7 +170,7 @@ class Experiment:
     stability: bool
     seed: int
     intervals: IntervalModel
-    part: SuitePart = SuitePart()
+    part: SuitePart = WHOLE
     frozen: Frozen | None = field(default=None, repr=False)
     left_out: tuple[str, ...] = ()
 
@@ -195,7 +198,7 @@ class Experiment:
             "stability": self.stability,
             "seed": self.seed,
             "intervals": self.intervals.model_dump(),
-            **({} if self.part == SuitePart() else {"suite": self.part.to_dict()}),
+            **({} if self.part == WHOLE else {"suite": self.part.to_dict()}),
         }
 
 
@@ -267,18 +270,12 @@ def read_experiment(
     return experiment if seeds is None else _private(experiment, read_seeds(seeds), source)
 
 
-def _datasets(model: ExperimentModel, source: YamlFile, roots: list[str]) -> tuple[DatasetSource, ...]:
-    sources = dataset_sources(model.datasets, source, roots)
-    uses = zip(sources, model.datasets, strict=True)
-    return tuple(replace(one, optional=use.optional, timed=use.latency) for one, use in uses)
-
-
 def _frozen(experiment: Experiment, frozen: Frozen | None) -> Experiment:
     """The experiment as a suite, where a lock file lies beside it and has its name."""
     if frozen is None or frozen.name != experiment.name:
         return experiment
     labels = [dataset.label for dataset in experiment.datasets if not dataset.optional]
-    frozen.check_rules(labels, [asdict(rule) for rule in rules_of(experiment.to_dict())])
+    frozen.check_rules(labels, [rule.to_dict() for rule in rules_of(experiment.to_dict())])
     return replace(experiment, frozen=frozen, part=SuitePart(version=frozen.version))
 
 
@@ -307,6 +304,12 @@ def _private(experiment: Experiment, seeds: Seeds, source: YamlFile) -> Experime
         raise ConfigError(f"{source.name}: none of its datasets has a seed, so it has no private half")
     part = replace(experiment.part, seeds=seeds.sha256)
     return replace(experiment, datasets=tuple(drawn), left_out=tuple(left_out), part=part, frozen=None)
+
+
+def _datasets(model: ExperimentModel, source: YamlFile, roots: list[str]) -> tuple[DatasetSource, ...]:
+    sources = dataset_sources(model.datasets, source, roots)
+    uses = zip(sources, model.datasets, strict=True)
+    return tuple(replace(one, region=use.region, optional=use.optional, timed=use.latency) for one, use in uses)
 
 
 def _metrics(model: ExperimentModel, source: YamlFile) -> tuple[str, ...] | dict[str, Any]:

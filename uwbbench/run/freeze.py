@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -53,7 +52,7 @@ def freeze(name: Given, data_dir: Path | None = None, progress: Callable[[str], 
         marks = pool(delayed(_marked)(one) for one in references)
         captures[dataset.label] = {one.name: mark for one, mark in zip(references, marks, strict=True)}
     contents = {(label, name): mark.sha256 for label, marks in captures.items() for name, mark in marks.items()}
-    rules = [asdict(rule) for rule in rules_of(experiment.to_dict())]
+    rules = [rule.to_dict() for rule in rules_of(experiment.to_dict())]
     frozen = Frozen(lock_of(path), experiment.name, suite_version(contents, rules), captures)
     frozen.write()
     return frozen

@@ -45,11 +45,13 @@ def _scored_again(folder: RunFolder, entry: Entry, rules: Sequence[ScoringRules]
     These hold under the rules of the run alone; under others they are not known.
     """
     detections, header = folder.detections(entry.unit), folder.header(entry.capture_id)
+    rules = [rule.of(entry.dataset) for rule in rules]
+    of_run = [rule.of(entry.dataset) for rule in rules_of(folder.manifest["experiment"])]
     rows = score_rows(detections, header, rules)
     if scorable(rows):
         rows = with_causes(rows, detections, Scene.of(detections, header), rules)
     if detections.candidates is None:
-        same = {rule.scoring for rule in set(rules) & set(rules_of(folder.manifest["experiment"]))}
+        same = {rule.scoring for rule in set(rules) & set(of_run)}
         known = {(row["scoring"], row["table"]): row[CAUSES] for row in entry.scores if CAUSES in row}
         for row in rows:
             key = row["scoring"], row["table"]

@@ -227,7 +227,9 @@ def read_frozen(experiment: Path) -> Frozen | None:
         }
         return Frozen(path, str(data["suite"]), str(data["version"]), captures)
     except (KeyError, TypeError, ValueError, AttributeError):
-        raise ConfigError(f"{path}: is no lock file of a suite; remove it: 'uwbbench freeze {experiment}' writes one") from None
+        raise ConfigError(
+            f"{path}: is no lock file of a suite; remove it: 'uwbbench freeze {experiment}' writes one"
+        ) from None
 
 
 @dataclass(frozen=True)
@@ -251,3 +253,7 @@ class SuitePart:
     def to_dict(self) -> dict[str, Any]:
         """As plain values."""
         return asdict(self)
+
+
+WHOLE = SuitePart()
+"""All of an experiment that is not frozen."""

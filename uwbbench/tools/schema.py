@@ -15,7 +15,8 @@ from uwbbench.api import registry
 from uwbbench.api.errors import PluginError
 from uwbbench.config.datasets import DatasetUse
 from uwbbench.config.detector import BY_CHANNEL, DetectorModel, StepModel
-from uwbbench.run.experiment import ExperimentModel
+from uwbbench.run.experiment import ExperimentModel, ScoredDataset
+from uwbbench.tools.fit.config import FitModel
 from uwbbench.tools.gate.config import GateModel
 from uwbbench.tools.tune.config import TuneModel
 
@@ -31,7 +32,7 @@ def detector_schema() -> Schema:
 
 def experiment_schema() -> Schema:
     """JSON Schema of an experiment file; each dataset's parameters follow from its ``use``."""
-    schema = _file_schema(ExperimentModel, DatasetUse, "datasets", by_channel=False)
+    schema = _file_schema(ExperimentModel, ScoredDataset, "datasets", by_channel=False)
     properties = schema["properties"]
     # The two short forms that the model accepts: `scoring: frame` and `latency: false`.
     properties["scoring"] = _or(properties["scoring"], properties["scoring"]["items"])
@@ -49,6 +50,11 @@ def tuning_schema() -> Schema:
     return _file_schema(TuneModel, DatasetUse, "datasets", by_channel=False)
 
 
+def fit_schema() -> Schema:
+    """JSON Schema of a fit file."""
+    return {"$schema": DIALECT, **FitModel.model_json_schema()}
+
+
 def scene_schema() -> Schema:
     """JSON Schema of a scene file; each term's parameters follow from its ``use``.
 
@@ -58,7 +64,17 @@ def scene_schema() -> Schema:
         If the dataset that reads scenes cannot be loaded.
     """
     simulator = registry.load_plugin("datasets", registry.default("dataset.scenes"))
-    return _file_schema(simulator.scene_model, simulator.term_model, "terms", by_channel=False)
+    schema = _file_schema(simulator.scene_model, simulator.term_model, "terms", by_channel=True)
+    for part in (schema, *schema["$defs"].values()):
+        own = part.get("properties", {})
+        own |= {key: _or_by_channel(value) for key, value in own.items() if _may_differ(key, value)}
+    return schema
+
+
+def _may_differ(key: str, value: Schema) -> bool:
+    """Whether a scene may give the key a value for each channel, and that is not said yet."""
+    said = any(BY_CHANNEL in one.get("properties", {}) for one in value.get("anyOf", ()))
+    return not said and "const" not in value and key not in ("schema", "name", "vary", "channel")
 
 
 def _file_schema(

@@ -7,7 +7,7 @@ import zlib
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -33,8 +33,18 @@ from uwbbench_datasets.simulator.trajectory import sampled
 BLOCK = 1024
 """Frames synthesised at once. Random streams start anew at each block, so that changing it changes all draws."""
 
+_NO_RUN = 0
+"""In the place of a run's number, which counts from 1, in the streams of what belongs to the robot."""
+
 _HEIGHTS = 2**18
 """Values of pulses and sums held at a time, which bounds the memory."""
+
+
+class _Stream(NamedTuple):
+    """What the random streams of a term follow from."""
+
+    seed: int
+    key: tuple[int, ...]
 
 
 @dataclass
@@ -43,8 +53,8 @@ class _Part:
 
     name: str
     term: Term[Any]
-    seed: int
-    key: tuple[int, ...]
+    of_run: _Stream
+    of_prepare: _Stream  # the robot's, where what is drawn once belongs to it
     seconds: float = 0.0
     pulses: int = 0
 
@@ -54,8 +64,9 @@ class _Part:
 
     def rng(self, hook: Literal["prepare", "paths", "apply", "record"], block: int = 0) -> np.random.Generator:
         """Random stream of one hook, in one block if it works on blocks."""
-        key = (*self.key, zlib.crc32(hook.encode()), block)
-        return np.random.Generator(np.random.SFC64(np.random.SeedSequence(self.seed, spawn_key=key)))
+        seed, owner = self.of_prepare if hook == "prepare" else self.of_run
+        key = (*owner, zlib.crc32(hook.encode()), block)
+        return np.random.Generator(np.random.SFC64(np.random.SeedSequence(seed, spawn_key=key)))
 
 
 @dataclass(frozen=True)
@@ -145,8 +156,11 @@ def _one_receiver(
 def _part(scene: Scene, run: int, receiver: str, index: int) -> _Part:
     use, term, params = scene.terms[index]
     owner = "" if term.shared else receiver
-    key = (run, zlib.crc32(owner.encode()), zlib.crc32(use.name.encode()))
-    return _Part(use.name, term(params), scene.model.seed, key)
+    key = (zlib.crc32(owner.encode()), zlib.crc32(use.name.encode()))
+    of_run = of_prepare = _Stream(scene.model.seed, (run, *key))
+    if term.of_robot and scene.robot_seed is not None:
+        of_prepare = _Stream(scene.robot_seed, (_NO_RUN, scene.model.radar.channel, *key))
+    return _Part(use.name, term(params), of_run, of_prepare)
 
 
 def _view(scene: Scene, radar: Radar, trajectory: Trajectory, objects: tuple[SceneObject, ...]) -> View:
@@ -178,6 +192,8 @@ def _view(scene: Scene, radar: Radar, trajectory: Trajectory, objects: tuple[Sce
 def _described(scene: Scene, contributions: Mapping[str, Sequence[Contribution]]) -> str:
     """Description for the captures' file: how they were made."""
     about = scene.model.description or scene.name
+    if scene.robot_seed is not None:
+        about += f" Robot {scene.robot or 'without a file'}, seed {scene.robot_seed}."
     parts = [f"{receiver}: {described(of_terms)}" for receiver, of_terms in contributions.items()]
     return " | ".join([f"Simulated by uwbbench. {about}", *parts])
 

@@ -5,19 +5,18 @@ from __future__ import annotations
 import itertools
 import zlib
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import ConfigDict, Field, model_validator
 
 from uwbbench.api import (
     CHANNEL_CENTER_HZ,
     ConfigError,
     Params,
     PluginError,
-    Pulse,
     Radar,
     Term,
     YamlFile,
@@ -26,66 +25,13 @@ from uwbbench.api import (
     read_yaml,
     with_values,
 )
-from uwbbench_datasets.simulator.pulses import GaussianPulse, RaisedCosinePulse
+from uwbbench_datasets.simulator.by_channel import for_channel
+from uwbbench_datasets.simulator.radar import CHIP_S, RadarModel, ReceiverModel
+from uwbbench_datasets.simulator.robot import Robot, read_robot
 from uwbbench_datasets.simulator.shapes import ObjectModel
-from uwbbench_datasets.simulator.trajectory import Point, TrajectoryModel, in_space
+from uwbbench_datasets.simulator.trajectory import TrajectoryModel, in_space
 
-CHIP_S = 1 / 499.2e6
-"""Chip duration of IEEE 802.15.4 HRP UWB: two taps."""
 _MOST_VARIANTS = 10_000
-
-
-class PulseModel(Params):
-    """Pulse shape."""
-
-    shape: Literal["gauss", "raised_cosine"] = Field(
-        default="gauss", description="raised_cosine: that of IEEE 802.15.4."
-    )
-    fwhm_ns: float = Field(
-        default=3.2, gt=0, description="Width of the Gaussian at half height; unused by raised_cosine."
-    )
-
-    def pulse(self) -> Pulse:
-        """The pulse itself."""
-        return RaisedCosinePulse(CHIP_S) if self.shape == "raised_cosine" else GaussianPulse(self.fwhm_ns * 1e-9)
-
-
-class RadarModel(Params):
-    """What all receivers of the scene share."""
-
-    channel: Literal[5, 9] = Field(default=9, description="IEEE 802.15.4 channel.")
-    taps: int = Field(default=50, ge=8, le=4096, description="Samples of one frame, half a chip (1.0016 ns) apart.")
-    frame_rate_hz: float = Field(default=48.0, gt=0)
-    crest_tap: float = Field(default=7.0, ge=0, description="Tap of the direct path's crest.")
-    noise_taps: int = Field(default=4, ge=0, description="Leading taps that precede any arrival.")
-    pulse: PulseModel = PulseModel()
-    array_spacing_mm: float = Field(
-        default=17.8, gt=0, description="Distance of the two antennas, the same on all channels."
-    )
-    gain_dbi: float = Field(
-        default=6.0, description="Receiving antenna's gain for echoes; the direct path is without it."
-    )
-    sts: bool = Field(default=True, description="Whether frames hold the two STS responses.")
-
-    @model_validator(mode="after")
-    def _taps_fit(self) -> RadarModel:
-        if not self.noise_taps <= self.crest_tap < self.taps:
-            raise ValueError("crest_tap must lie behind the noise_taps and before the last tap")
-        return self
-
-
-class ReceiverModel(Params):
-    """One receiver on the robot, and the transmitter that it listens to."""
-
-    mount_position_m: Point = Field(default=[0.0, 0.0], description="Receiver in the robot frame.")
-    mount_yaw_deg: float = Field(default=0.0, description="Boresight in the robot frame.")
-    tx_position_m: Point = Field(default=[0.0, -0.25], description="Transmitter in the robot frame.")
-
-    @model_validator(mode="after")
-    def _apart(self) -> ReceiverModel:
-        if np.array_equal(in_space(self.mount_position_m), in_space(self.tx_position_m)):
-            raise ValueError("tx_position_m and mount_position_m are equal: a direct path needs a distance to fly")
-        return self
 
 
 class TermUse(Params):
@@ -111,13 +57,31 @@ class FidelityModel(Params):
     force: list[str] = Field(default_factory=list, description="Terms that are kept in any case.")
 
 
-class SceneModel(Params):
-    """A scene."""
+class SceneNames(Params):
+    """What a scene file says before its variants are told apart."""
+
+    model_config = ConfigDict(extra="ignore")
+
+    name: str | None = Field(None, min_length=1, description="Name of the captures; the file's name if left out.")
+    vary: dict[str, Annotated[list[Any], Field(min_length=1)]] = Field(
+        default_factory=dict, description="Values by path; each combination is a variant of its own."
+    )
+
+
+class SceneModel(SceneNames):
+    """A scene. A value that depends on the channel is written ``{by_channel: {5: 1.0, 9: 0.2}}``."""
+
+    model_config = ConfigDict(extra="forbid")
 
     version: Literal[1] = Field(alias="schema", description="Version of this file format.")
-    name: str | None = Field(None, min_length=1, description="Name of the captures; the file's name if left out.")
     description: str = ""
-    seed: int = Field(1, ge=0, description="Of all random draws.")
+    seed: int = Field(1, ge=0, description="Of all random draws but those that belong to the robot.")
+    robot: str | None = Field(
+        None, description="The robot: a shipped name, or a file from the scene's folder. Its ringing is then its own."
+    )
+    robot_seed: int | None = Field(
+        None, ge=0, description="Of what is drawn once for the robot, in place of the seed in its file."
+    )
     runs: int = Field(1, ge=1, le=10_000, description="Captures of each variant, with other draws.")
     radar: RadarModel = RadarModel()
     receivers: dict[Annotated[str, Field(pattern=r"^[\w-]+$")], ReceiverModel] = Field(
@@ -127,9 +91,6 @@ class SceneModel(Params):
     objects: list[ObjectModel] = Field(default_factory=list)
     terms: list[TermUse] = Field(min_length=1, description="What frames are made of; the order counts in each hook.")
     fidelity: FidelityModel = FidelityModel()
-    vary: dict[str, Annotated[list[Any], Field(min_length=1)]] = Field(
-        default_factory=dict, description="Values by path; each combination is a variant of its own."
-    )
     draw: dict[str, Annotated[list[float], Field(min_length=2, max_length=2)]] = Field(
         default_factory=dict, description="Values by path that each run draws anew, evenly between two ends."
     )
@@ -156,16 +117,27 @@ class Scene:
     name : str
         ``scene`` or ``scene/variant``.
     model : SceneModel
+        With the radar as it is on the robot.
     terms : tuple of (TermUse, type, Params)
         Each term with its class and checked parameters.
+        With parameters that belong to the robot.
     folder : Path
         Where files that the scene names lie.
+    robot_seed : int or None
+        Of what is drawn once for the robot; None where each run draws it anew.
+    robot : str
+        Name of the robot; empty where the scene names none.
+    source : YamlFile
+        Its file, with the values of this variant.
     """
 
     name: str
     model: SceneModel
     terms: tuple[tuple[TermUse, type[Term[Any]], Params], ...]
     folder: Path
+    robot_seed: int | None = None
+    robot: str = ""
+    source: YamlFile = field(default_factory=lambda: YamlFile("scene", {}, {}), repr=False, compare=False)
 
     def of_run(self, run: int) -> Scene:
         """The scene with what a run draws anew; each path has a random stream of its own.
@@ -181,10 +153,8 @@ class Scene:
         for path, (low, high) in self.model.draw.items():
             stream = np.random.SeedSequence(self.model.seed, spawn_key=(run, zlib.crc32(path.encode())))
             drawn[path] = float(np.random.Generator(np.random.SFC64(stream)).uniform(low, high))
-        source = YamlFile(f"scene '{self.name}', draw", {}, {})
-        data = with_values(self.model.model_dump(by_alias=True), drawn, source.name)
-        model = checked(SceneModel, data, source)
-        return replace(self, model=model, terms=_terms(model, source))
+        data = with_values(self.source.data, {**drawn, "seed": self.model.seed}, self.source.place(("draw",)))
+        return _scene(self.name, data, self.source, self.folder)
 
     def radar(self, receiver: str) -> Radar:
         """Radar of one receiver."""
@@ -231,21 +201,39 @@ def read_scenes(path: Path, changes: Mapping[str, Any] | None = None) -> list[Sc
     data = with_values(source.data, changes, "--set")
     if isinstance(data.get("vary"), dict):
         data["vary"] = {key: values for key, values in data["vary"].items() if key not in changes}
-    base = checked(SceneModel, data, source)
-    name = base.name or path.stem
-    count = int(np.prod([float(len(values)) for values in base.vary.values()]))
+    names = checked(SceneNames, data, source)
+    name, vary = names.name or path.stem, names.vary
+    count = int(np.prod([float(len(values)) for values in vary.values()]))
     if count > _MOST_VARIANTS:
         raise ConfigError(f"{source.place(('vary',))}: {count} variants are more than {_MOST_VARIANTS}")
-    labels = _short_names(list(base.vary))
+    labels = _short_names(list(vary))
     scenes = []
-    for values in itertools.product(*base.vary.values()):
-        chosen = dict(zip(base.vary, values, strict=True))
-        model = checked(SceneModel, with_values(data, chosen, source.place(("vary",))), source) if chosen else base
-        parts = [f"{labels[key]}-{_text(base.vary[key], value)}" for key, value in chosen.items()]
+    for values in itertools.product(*vary.values()):
+        chosen = dict(zip(vary, values, strict=True))
+        variant = with_values(data, chosen, source.place(("vary",))) if chosen else data
+        parts = [f"{labels[key]}-{_text(vary[key], value)}" for key, value in chosen.items()]
         whole = "/".join([name, *(["_".join(parts)] if parts else [])])
-        scenes.append(Scene(whole, model, _terms(model, source), path.parent))
+        scenes.append(_scene(whole, variant, source, path.parent))
         scenes[-1].of_run(1)  # so that a path that leads nowhere is found before anything is simulated
     return scenes
+
+
+def _scene(name: str, data: Mapping[str, Any], source: YamlFile, folder: Path) -> Scene:
+    """One variant, from the values that the file has in it."""
+    radar = data.get("radar")
+    channel = (radar if isinstance(radar, dict) else {}).get("channel", RadarModel().channel)
+    fixed = {key: value for key, value in data.items() if key != "vary"}
+    model = checked(SceneModel, for_channel(fixed, channel, source), source)
+    robot, place = None, source.place(("robot",))
+    if model.robot is not None:
+        robot = read_robot(model.robot, folder, place)
+        robot.check_fits(model.radar, place)
+        robot.check_used([item.name for item in model.terms], model.radar.channel, place)
+        model = model.model_copy(update={"radar": robot.radar(model.radar, source)})
+    own_seed = robot.model.seed if robot else None
+    seed = own_seed if model.robot_seed is None else model.robot_seed
+    terms, called = _terms(model, robot, source), robot.model.name if robot else ""
+    return Scene(name, model, terms, folder, seed, called, replace(source, data=dict(data)))
 
 
 def _short_names(paths: list[str]) -> dict[str, str]:
@@ -266,13 +254,17 @@ def _text(values: list[Any], value: Any) -> str:
     return str(values.index(value) + 1) if isinstance(value, list | dict) else str(value).replace("/", "-")
 
 
-def _terms(model: SceneModel, source: YamlFile) -> tuple[tuple[TermUse, type[Term[Any]], Params], ...]:
+def _terms(
+    model: SceneModel, robot: Robot | None, source: YamlFile
+) -> tuple[tuple[TermUse, type[Term[Any]], Params], ...]:
     terms = []
     for index, item in enumerate(model.terms):
         try:
             term: type[Term[Any]] = load_plugin("terms", item.use)
         except PluginError as error:
             raise PluginError(f"{source.place(('terms', index, 'use'))}: {error}") from error
-        params = checked(term.params_type(), item.params, source, ("terms", index, "params"))
+        at = ("terms", index, "params")
+        given = robot.params(item.name, model.radar.channel, item.params, source, at) if robot else item.params
+        params = checked(term.params_type(), given, source, at)
         terms.append((item, term, params))
     return tuple(terms)

@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 from pydantic import Field, model_validator
 
-from uwbbench.api import FloatArray, Obstacle, Params, SceneObject, rotate_z
+from uwbbench.api import EchoFading, EchoTail, FloatArray, Obstacle, Params, SceneObject, rotate_z
 from uwbbench_datasets.simulator.trajectory import Point, in_space
 
 _SIZES = {
@@ -43,6 +43,14 @@ class ObjectModel(Params):
     radius_m: float | None = Field(None, gt=0)
     material: str = Field("metal", description="Name of a material that the echo terms know.")
     thickness_m: float | None = Field(None, gt=0, description="Thickness of a hollow body's walls, for a slab.")
+    loss_db: float | None = Field(
+        None, description="What the body loses against an ideal one; what is usual of its material if left out."
+    )
+    fading: EchoFading | None = Field(None, description="Rise and fall of the echo along the way; none if left out.")
+    tail: EchoTail | None = Field(None, description="Returns from behind the face; none if left out.")
+    bearing_bias_deg: float = Field(0.0, description="Constant error of the direction that echoes seem to come from.")
+    bearing_sd_deg: float = Field(0.0, ge=0, description="Standard deviation of the rest of that error (glint).")
+    bearing_length_m: float = Field(0.05, gt=0, description="Way of the receiver over which it becomes another.")
     structure: bool | None = Field(None, description="Not an obstacle to be found; true for walls if left out.")
 
     @model_validator(mode="after")
@@ -54,6 +62,9 @@ class ObjectModel(Params):
         missing = wanted - given - set(_USUAL.get(self.shape, {}))
         if missing:
             raise ValueError(f"a {self.shape} needs {', '.join(sorted(missing))}")
+        mirrors = {"fading", "tail", "bearing_bias_deg", "bearing_sd_deg", "bearing_length_m"} & self.model_fields_set
+        if self.shape == "wall" and mirrors:
+            raise ValueError(f"a wall has no {sorted(mirrors)[0]}: its echo is that of a mirror")
         return self
 
     def _size(self, name: str) -> float:
@@ -69,7 +80,20 @@ class ObjectModel(Params):
         outline = center[:2] + rotate_z(_outline(self.shape, width, depth), yaw)[:, :2]
         obstacle = Obstacle(self.id, self.material, outline, structure)
         return SceneObject(
-            obstacle, self.shape, center, yaw, width, depth, self._size("height_m"), thickness_m=self.thickness_m
+            obstacle,
+            self.shape,
+            center,
+            yaw,
+            width,
+            depth,
+            self._size("height_m"),
+            thickness_m=self.thickness_m,
+            loss_db=self.loss_db,
+            fading=self.fading,
+            tail=self.tail,
+            bearing_bias_rad=float(np.radians(self.bearing_bias_deg)),
+            bearing_sd_rad=float(np.radians(self.bearing_sd_deg)),
+            bearing_length_m=self.bearing_length_m,
         )
 
 

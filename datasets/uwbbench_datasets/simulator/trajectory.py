@@ -36,18 +36,51 @@ class Static(Params):
         return _poses(times, np.tile(in_space(self.position_m), (len(times), 1)), np.radians(self.yaw_deg))
 
 
+class Halt(Params):
+    """Where the robot stands still on its way, and for how long."""
+
+    at_m: float = Field(ge=0, description="Distance from the start of the way.")
+    seconds: float = Field(gt=0)
+
+
 class Straight(Params):
-    """From one point straight to another at constant speed."""
+    """From one point straight to another at constant speed, with halts where the scene names some."""
 
     kind: Literal["straight"]
     start_m: Point
     end_m: Point
     speed_m_s: float = Field(0.3, gt=0)
     yaw_deg: float | None = Field(None, description="Heading; along the way if left out.")
+    halts: list[Halt] = Field(default_factory=list, description="In the order of the way.")
+
+    @model_validator(mode="after")
+    def _halts_on_the_way(self) -> Straight:
+        length, reached = _length(self.start_m, self.end_m), 0.0
+        for number, halt in enumerate(self.halts):
+            if halt.at_m > length:
+                raise ValueError(f"halts[{number}].at_m: {halt.at_m:g} m lies behind the end of the way, {length:g} m")
+            if number and halt.at_m <= reached:
+                raise ValueError(
+                    f"halts[{number}].at_m: {halt.at_m:g} m must lie behind the halt before, {reached:g} m"
+                )
+            reached = halt.at_m
+        return self
 
     def sampled(self, rate_hz: float) -> Trajectory:
         """Pose at each frame."""
-        return _along([self.start_m, self.end_m], self.speed_m_s, self.yaw_deg, rate_hz)
+        track = _along([self.start_m, self.end_m], self.speed_m_s, self.yaw_deg, rate_hz)
+        if not self.halts:
+            return track
+        at_m, halt_s = np.array([[halt.at_m, halt.seconds] for halt in self.halts]).T
+        left_s = at_m / self.speed_m_s + np.cumsum(halt_s)
+        length = _length(self.start_m, self.end_m)
+        knots_s = np.concatenate(
+            [[0.0], np.stack([left_s - halt_s, left_s], axis=1).ravel(), [length / self.speed_m_s + halt_s.sum()]]
+        )
+        times = _times(knots_s[-1], rate_hz)
+        gone = np.interp(times, knots_s, np.concatenate([[0.0], np.repeat(at_m, 2), [length]]))
+        start, end = in_space(self.start_m), in_space(self.end_m)
+        return _poses(times, start + gone[:, None] * (end - start) / max(length, 1e-9), float(track.yaw_rad[0]))
 
 
 class Waypoints(Params):
@@ -165,6 +198,10 @@ def _times(duration_s: float, rate_hz: float) -> FloatArray:
     if duration_s * rate_hz > _LONGEST:
         raise CaptureError(f"a trajectory of {duration_s:g} s has more than {_LONGEST} frames at {rate_hz:g} Hz")
     return np.arange(int(duration_s * rate_hz * (1 + 1e-12)) + 1) / rate_hz
+
+
+def _length(start: list[float], end: list[float]) -> float:
+    return float(np.linalg.norm(in_space(end) - in_space(start)))
 
 
 def _poses(times: FloatArray, position_m: FloatArray, yaw_rad: FloatArray | float) -> Trajectory:

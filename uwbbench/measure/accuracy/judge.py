@@ -30,8 +30,9 @@ Conventions
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
-from typing import get_args
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, replace
+from typing import Any, get_args
 
 import numpy as np
 
@@ -67,6 +68,8 @@ class ScoringRules:
         Score only that many detections of a frame, those of largest amplitude in the region.
     surface : {"outline", "visible"}
         What the error of a position is the distance to: the outline, 0 inside, or what the receiver sees of it.
+    regions : tuple of (str, Region)
+        Datasets of a run, by label, that have a region of their own; see :meth:`of`.
 
     Raises
     ------
@@ -79,6 +82,23 @@ class ScoringRules:
     region: Region = field(default_factory=Region)
     strongest: int | None = None
     surface: Surface = "outline"
+    regions: tuple[tuple[str, Region], ...] = ()
+
+    def of(self, dataset: str) -> ScoringRules:
+        """Rules of the captures of one dataset of a run, by its label."""
+        return replace(self, region=dict(self.regions).get(dataset, self.region), regions=())
+
+    def to_dict(self) -> dict[str, Any]:
+        """Rules as plain values; regions of datasets only where there are any, as earlier versions had none."""
+        facts = asdict(self)
+        regions = {label: asdict(region) for label, region in self.regions}
+        return {**facts, "regions": regions} if regions else {k: v for k, v in facts.items() if k != "regions"}
+
+    @classmethod
+    def from_dict(cls, facts: Mapping[str, Any]) -> ScoringRules:
+        """Rules from plain values."""
+        regions = tuple((label, Region(**region)) for label, region in facts.get("regions", {}).items())
+        return cls(**{**facts, "region": Region(**facts["region"]), "regions": regions})
 
     def __post_init__(self) -> None:
         if self.surface not in get_args(Surface):

@@ -10,7 +10,6 @@ Conventions
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
@@ -49,7 +48,7 @@ def changes(first: RunFolder, second: RunFolder) -> list[Change]:
 
 def _configuration(first: RunFolder, second: RunFolder) -> Iterator[Change]:
     yield from _nested("", first.manifest["experiment"], second.manifest["experiment"])
-    rules = [[plain(dataclasses.asdict(rule)) for rule in folder.rules] for folder in (first, second)]
+    rules = [[plain(rule.to_dict()) for rule in folder.rules] for folder in (first, second)]
     yield from _differing("configuration", {"rules of the scores": rules[0]}, {"rules of the scores": rules[1]})
 
 

@@ -101,7 +101,7 @@ def flips(
 def _frames(unit: Unit, side: int, rule: ScoringRules) -> tuple[IntArray, Outcome, FloatArray]:
     """Scored frames, their outcome, and the largest absolute error (frames of the capture,) of each frame."""
     scene = Scene.of(unit.detections[side], unit.header)
-    outcome = judge(unit.detections[side], scene, rule, "filtering").outcome
+    outcome = judge(unit.detections[side], scene, rule.of(unit.dataset), "filtering").outcome
     scored = np.flatnonzero(scene.scored).astype(np.int64)
     error_m = np.full(len(unit.header), np.nan)
     np.fmax.at(error_m, scored[outcome.error_frame], np.abs(outcome.error_m))

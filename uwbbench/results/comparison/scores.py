@@ -106,7 +106,9 @@ def score_changes(
     for unit in units:
         for rule in rules:
             try:
-                before, after = (outcomes(detections, unit.header, rule) for detections in unit.detections)
+                before, after = (
+                    outcomes(detections, unit.header, rule.of(unit.dataset)) for detections in unit.detections
+                )
             except ScoringError as error:
                 missing[f"not judged by {rule.scoring}: {error}"] = None
                 continue

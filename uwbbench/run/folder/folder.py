@@ -29,7 +29,7 @@ from uwbbench.api.capture import CaptureHeader
 from uwbbench.api.detections import Detections
 from uwbbench.api.errors import StoreError
 from uwbbench.measure.accuracy.ranked import RankedCounts
-from uwbbench.measure.accuracy.scoring import Region, ScoringRules
+from uwbbench.measure.accuracy.scoring import ScoringRules
 from uwbbench.run.folder import journal, tables
 from uwbbench.run.folder.files import disk_errors, read_json, read_parquet, write_json, write_parquet, write_text
 from uwbbench.run.folder.identity import digest, plain
@@ -260,7 +260,7 @@ class RunFolder:
 
         names = list(dict.fromkeys(name for row in rows for name in row))
         columns = {name: [_encodable(row.get(name)) for row in rows] for name in names}
-        facts = {"rules": [dataclasses.asdict(rule) for rule in rules]}
+        facts = {"rules": [rule.to_dict() for rule in rules]}
         write_parquet(self._scores, pa.table(columns), facts)
         if self.sealed:  # the other files keep the hashes that they had when the run ended
             self._seal({**self.manifest["files"], self._scores.name: self.hash_of(self._scores.name)})
@@ -280,7 +280,7 @@ class RunFolder:
     def rules(self) -> list[ScoringRules]:
         """Rules that the stored scores follow."""
         stored = self._read_scores()[1]["rules"]
-        return [ScoringRules(**{**rule, "region": Region(**rule["region"])}) for rule in stored]
+        return [ScoringRules.from_dict(rule) for rule in stored]
 
     @property
     def _scores(self) -> Path:

@@ -15,7 +15,6 @@ import hashlib
 import json
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -137,8 +136,8 @@ def accuracy_identity(detector: str, sha256: str, rules: Sequence[ScoringRules])
 
 def _facts_of(rule: ScoringRules) -> dict[str, Any]:
     """Rules as plain values, without a choice that earlier versions lacked where it is what they did."""
-    facts = asdict(rule)
-    return facts if facts.pop("surface") == "outline" else asdict(rule)
+    facts = rule.to_dict()
+    return facts if facts.pop("surface") == "outline" else rule.to_dict()
 
 
 def latency_identity(detector: str, sha256: str, settings: Mapping[str, Any], machine: Mapping[str, Any]) -> str:

@@ -28,13 +28,24 @@ CAUSES = "causes"
 
 def rules_of(experiment: Mapping[str, Any]) -> tuple[ScoringRules, ...]:
     """Scoring rules of an experiment as the manifest holds it, one for each scoring."""
-    region = Region(**RegionModel.model_validate(experiment["region"]).limits)
+    region = _region(experiment["region"])
+    regions = tuple((used["label"], _region(used["region"])) for used in experiment["datasets"] if "region" in used)
     return tuple(
         ScoringRules(
-            scoring, experiment["gate_m"], region, experiment["strongest"], experiment.get("surface", "outline")
+            scoring,
+            experiment["gate_m"],
+            region,
+            experiment["strongest"],
+            experiment.get("surface", "outline"),
+            regions,
         )
         for scoring in experiment["scoring"]
     )
+
+
+def _region(stored: Mapping[str, Any]) -> Region:
+    """Region as an experiment's file has it."""
+    return Region(**RegionModel.model_validate(stored).limits)
 
 
 def score_rows(detections: Detections, header: CaptureHeader, rules: Iterable[ScoringRules]) -> list[dict[str, Any]]:
@@ -140,7 +151,11 @@ def with_metrics(
         if not scored:
             continue
         detections, header = folder.detections(entry.unit), folder.header(entry.capture_id)
-        tables = {rule.scoring: outcomes(detections, header, rule) for rule in rules if rule.scoring in scored}
+        tables = {
+            rule.scoring: outcomes(detections, header, rule.of(entry.dataset))
+            for rule in rules
+            if rule.scoring in scored
+        }
         for place, row in enumerate(rows):
             if row["status"] == "scored":
                 outcome = tables[row["scoring"]][row["table"]]

@@ -211,7 +211,7 @@ class _Verifier:
 
     def _accuracy(self, entry: Entry) -> None:
         sha256 = self._content(entry)
-        rules = rules_of(self.manifest["experiment"])
+        rules = [rule.of(entry.dataset) for rule in rules_of(self.manifest["experiment"])]
         self._identity(entry, [accuracy_identity(self._detector_of(entry), sha256, rules)])
         detections, header = self.folder.detections(entry.unit), self.folder.header(entry.capture_id)
         counts = {"frames": len(header), "processed": len(detections.processed), "detections": len(detections)}
@@ -226,8 +226,8 @@ class _Verifier:
         self._same(f"journal.jsonl, {_about(entry)}", entry.scores, again)
         for row in entry.scores:
             self._causes(f"journal.jsonl, {_about(entry)}", row)
-        stored = self.folder.rules
-        self.sound[entry.unit] = again if stored == list(rules) else score_rows(detections, header, stored)
+        stored = [rule.of(entry.dataset) for rule in self.folder.rules]
+        self.sound[entry.unit] = again if stored == rules else score_rows(detections, header, stored)
         self._count("units scored again")
         if REPORTED_FACT in entry.facts:
             times = reported_times(self.folder.times_us(entry.unit))
@@ -279,7 +279,8 @@ class _Verifier:
             expected.add(("stability", "", ""))
         if experiment["latency"]["enabled"] and set(detectors) > read_only:
             timed = {unit[2] for unit in units if unit[0] == "latency"}
-            for dataset in sorted({unit[2] for unit in units if unit[0] == "accuracy"} - timed):
+            untimed = {used["label"] for used in experiment["datasets"] if used.get("latency") is False}
+            for dataset in sorted({unit[2] for unit in units if unit[0] == "accuracy"} - timed - untimed):
                 self._problem("journal.jsonl", f"no line about times on {_shown(dataset)}")
         for kind, dataset, capture in sorted(expected):
             for detector in detectors:

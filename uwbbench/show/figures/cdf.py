@@ -48,7 +48,7 @@ def draw_cdf(results: list[Result], rules: ScoringRules, table: str = "filtering
         raise ConfigError(f"no table '{table}'.{nearest(table, tables)}")
     panels: dict[tuple[str, str, bool], dict[str, list[Outcome]]] = defaultdict(lambda: defaultdict(list))
     for result in results:
-        by_table = outcomes(result.detections, result.header, rules)
+        by_table = outcomes(result.detections, result.header, rules.of(result.dataset))
         if table in by_table:
             group = (result.dataset, result.header.source, by_table[table].exhaustive)
             panels[group][result.detector].append(by_table[table])

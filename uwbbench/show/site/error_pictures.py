@@ -47,7 +47,8 @@ def _curve(standing: Standing, dataset: str) -> RankedCurve | None:
     """Curve of the runs that count for a detector; None where they did not store what it needs."""
     parts: list[tuple[RankedCounts, str]] = []
     for (label, _), (run, entry) in sorted(standing.contender.chosen.items()):
-        counts = run.folder.curve(entry.unit, run.rules[0]) if label == dataset and entry.status == "done" else None
+        known = label == dataset and entry.status == "done"
+        counts = run.folder.curve(entry.unit, run.rules[0].of(label)) if known else None
         if counts is not None:
             parts.append((counts, run.folder.scene(label, entry.capture)))
     return ranked_curve(parts, CONFIDENCE)

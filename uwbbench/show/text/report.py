@@ -170,9 +170,20 @@ def _leaderboards(report: Report) -> Iterator[Sheet]:
         few = [one for one in report.set_aside if (one.dataset, one.source, one.scoring, "filtering") == board]
         seen = table == "mapping" and report.folder.rules[0].surface == "visible"
         faces = ["Errors are distances to the part of an outline that the receiver can see (surface: visible)."] * seen
+        faces += [f"Scored {text}."] if (text := _own_region(report, dataset)) else []
         said = _leaderboard_notes(members, quantities, report.metrics, report.timed)
         notes = (*map(set_aside_warning, few), *faces, *said)
         yield Sheet(title, ("detector", "rank", *heads, *extra), tuple(rows), notes)
+
+
+def _own_region(report: Report, dataset: str) -> str:
+    """Where the captures of a dataset are scored, if not where all others are; else empty."""
+    region = dict(report.folder.rules[0].regions).get(dataset)
+    if region is None:
+        return ""
+    to = "" if region.max_range_m is None else f" to {region.max_range_m:g} m"
+    angle = "" if region.half_angle_rad is None else f", up to {math.degrees(region.half_angle_rad):g} degrees aside"
+    return f"from {region.min_range_m:g} m{to}{angle}"
 
 
 def _leaderboard_notes(

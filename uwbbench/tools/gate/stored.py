@@ -68,7 +68,7 @@ class StoredRun:
         about = {"detector": entry.detector, "dataset": entry.dataset, "capture": entry.capture}
         table = self.folder.scores().to_dict("records")
         stored = [row for row in table if all(row[key] == value for key, value in about.items())]
-        again = score_rows(found, header, self.folder.rules)
+        again = score_rows(found, header, [rule.of(entry.dataset) for rule in self.folder.rules])
         if len(stored) != len(again):
             self._refuse(entry, f"{len(stored)} rows of scores for {len(again)}")
         for row in again:

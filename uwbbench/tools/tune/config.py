@@ -73,6 +73,12 @@ class Interval(ConfigModel):
             raise ValueError("whole needs a whole low, high and step")
         return self
 
+    @property
+    def middle(self) -> float:
+        """Number in its middle: the geometric one where equal ratios are searched alike."""
+        middle = math.sqrt(self.low * self.high) if self.log else (self.low + self.high) / 2
+        return round(middle) if self.whole else middle
+
 
 class Choices(ConfigModel):
     """Values that a search may take."""
@@ -94,6 +100,9 @@ class SearchModel(ConfigModel):
     trials: int = Field(default=100, ge=1, le=1_000_000, description="Detectors tried for each group.")
     sampler: Literal["tpe", "random"] = Field(default="tpe", description="How Optuna proposes the next one.")
     seed: int = Field(default=0, ge=0, description="Of the sampler.")
+    timeout_s: float | None = Field(
+        default=None, gt=0, description="Time after which no trial begins; null: as many trials as are asked for."
+    )
 
 
 class TuneModel(ConfigModel):

@@ -22,19 +22,19 @@ def require_optuna() -> None:
     try:
         import optuna  # noqa: F401
     except ImportError as error:
-        raise UwbbenchError("'search' needs Optuna; install it with: pip install 'uwbbench[tune]'") from error
+        raise UwbbenchError("a search needs Optuna; install it with: pip install 'uwbbench[tune]'") from error
 
 
 def search(model: SearchModel, objective: Objective, start: Mapping[str, Any] | None = None) -> None:
-    """Call an objective with proposed values, as many times as the model says.
+    """Call an objective with proposed values, as many times, or as long, as the model says.
 
     Parameters
     ----------
     model : SearchModel
     objective : callable
-        F1 of the detector with the given values by path; the larger the better.
+        Merit of the given values by path, such as a detector's F1; the larger the better.
     start : mapping, optional
-        Values to try first: those of the detector as it is, where the space holds them.
+        Values to try first: those of the file as it is, where the space holds them.
 
     Raises
     ------
@@ -54,7 +54,7 @@ def search(model: SearchModel, objective: Objective, start: Mapping[str, Any] | 
         study = optuna.create_study(direction="maximize", sampler=samplers[model.sampler](seed=model.seed))
         if start:
             study.enqueue_trial(dict(start))
-        study.optimize(lambda trial: objective(_proposed(trial, model)), n_trials=model.trials)
+        study.optimize(lambda trial: objective(_proposed(trial, model)), n_trials=model.trials, timeout=model.timeout_s)
     finally:
         optuna.logging.set_verbosity(before)
 

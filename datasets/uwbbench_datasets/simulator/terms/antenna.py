@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 import numpy as np
 from pydantic import Field
 
@@ -22,6 +24,8 @@ class Antenna(Term[AntennaParams]):
     Gain on boresight is the radar's ``gain_dbi``. The direct path arrives from the side and counts all that the
     receiving pattern takes from it as isolation.
     """
+
+    of_robot: ClassVar = True
 
     def prepare(self, view: View, rng: np.random.Generator) -> View:
         """Shape the receiving gain and lift all paths by the transmitter's."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 import numpy as np
 from pydantic import Field
 
@@ -12,6 +14,9 @@ class ArrayParams(Params):
     """Phase error of the second antenna over the first, as a function of azimuth."""
 
     offset_deg: float = Field(0.0, description="Constant error, as of unequal lines.")
+    offset_sd_deg: float = Field(
+        0.0, ge=0, description="Standard deviation of a further constant error, drawn once for the robot or the run."
+    )
     asymmetry_deg: float = Field(8.0, description="Error at 90 degrees on either side, times sin^2 of the azimuth.")
     coupling: float = Field(0.95, gt=0, description="Slope of the phase against that of the spacing alone.")
     ripple_deg: float = Field(5.0, description="Error times sin(ripples azimuth), as of a small ground plane.")
@@ -29,11 +34,14 @@ class ArrayResponse(Term[ArrayParams]):
     an error that differs between left and right; its sizes are chosen, not fitted to one board.
     """
 
+    of_robot: ClassVar = True
+
     def prepare(self, view: View, rng: np.random.Generator) -> View:
         """Replace the array's phase."""
         p = self.params
         ideal = view.array_phase
-        offset, asymmetry, ripple = np.radians([p.offset_deg, p.asymmetry_deg, p.ripple_deg])
+        drawn_deg = p.offset_sd_deg * rng.standard_normal() if p.offset_sd_deg else 0.0
+        offset, asymmetry, ripple = np.radians([p.offset_deg + drawn_deg, p.asymmetry_deg, p.ripple_deg])
 
         def phase(azimuth_rad: FloatArray) -> FloatArray:
             error = offset + asymmetry * np.sin(azimuth_rad) ** 2 + ripple * np.sin(p.ripples * azimuth_rad)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 import numpy as np
 from pydantic import Field
 
@@ -19,6 +21,8 @@ class Direct(Term[DirectParams]):
 
     All levels that other terms state relative to the direct path follow this attenuation.
     """
+
+    of_robot: ClassVar = True
 
     def prepare(self, view: View, rng: np.random.Generator) -> View:
         """Attenuate the direct path."""

@@ -11,6 +11,7 @@ far away the integral becomes ``sinc(2 width sin(tilt) / lambda)``.
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
 from typing import ClassVar
 
@@ -21,6 +22,7 @@ from scipy.special import fresnel
 from uwbbench.api import FloatArray, P, Params, Paths, SceneObject, Term, View
 from uwbbench_datasets.simulator.materials import SHAPE_LOSS_DB, reflection
 from uwbbench_datasets.simulator.shapes import Face, faces
+from uwbbench_datasets.simulator.terms.object_echo import bearing_error_rad, fading, tail
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(7)
 _LARGEST_INTEGRAL = 0.95
@@ -35,8 +37,12 @@ class PlateParams(Params):
 
 
 def reflected(body: SceneObject, frequency_hz: float) -> complex:
-    """Reflection coefficient of an object at normal incidence, less the fitted loss of real bodies of its material."""
-    loss_db = SHAPE_LOSS_DB.get(body.material, 0.0)
+    """Reflection coefficient of an object at normal incidence, less its loss.
+
+    Where a scene does not say the loss, it is the fitted one of real bodies of the material, and none of walls.
+    """
+    usual_db = 0.0 if body.shape == "wall" else SHAPE_LOSS_DB.get(body.material, 0.0)
+    loss_db = usual_db if body.loss_db is None else body.loss_db
     return reflection(body.material, frequency_hz, body.thickness_m) * 10 ** (-loss_db / 20)
 
 
@@ -53,16 +59,26 @@ class _Echo(Term[P]):
         raise NotImplementedError
 
     def _all(self, view: View, *, bound: bool) -> Paths | None:
-        points, amplitudes = [], []
+        points, amplitudes, errors_rad = [], [], []
         for column, body in enumerate(view.objects):
             if body.shape in self.shapes:
                 where, amplitude = self._echo(body, view, bound=bound)
                 material = reflected(body, view.radar.center_frequency_hz)
-                points.append(where)
-                amplitudes.append(material * amplitude * view.visibility[:, column, None])
+                strength = material * amplitude * view.visibility[:, column, None]
+                echoes = [(where, strength)]
+                if body.fading is not None:
+                    echoes = [(where, strength * fading(body, body.fading, view, bound=bound)[:, None])]
+                if body.tail is not None:
+                    echoes.append(tail(body, body.tail, where, strength, view, bound=bound))
+                points += [where for where, _ in echoes]
+                amplitudes += [strength for _, strength in echoes]
+                errors_rad += [bearing_error_rad(body, view)] * sum(where.shape[1] for where, _ in echoes)
         if not points:
             return None
-        return view.echoes(np.concatenate(points, axis=1), np.concatenate(amplitudes, axis=1))
+        paths = view.echoes(np.concatenate(points, axis=1), np.concatenate(amplitudes, axis=1))
+        if not np.any(errors_rad):
+            return paths
+        return dataclasses.replace(paths, azimuth_rad=paths.azimuth_rad + np.stack(errors_rad, axis=1))
 
     def bound(self, view: View) -> float:
         """All echoes of a frame in phase, each at the most that its distance allows."""

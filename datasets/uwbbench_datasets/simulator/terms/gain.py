@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
@@ -22,6 +22,8 @@ class FrameGain(Term[FrameGainParams]):
 
     What stands behind this term in the scene, such as noise, keeps its level.
     """
+
+    of_robot: ClassVar = True
 
     def apply(self, responses: Responses, view: View, rng: np.random.Generator) -> Responses:
         """Scale and turn each frame.

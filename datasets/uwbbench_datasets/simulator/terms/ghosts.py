@@ -20,9 +20,15 @@ from uwbbench.api import (
     View,
     nearest_on_outline,
 )
-from uwbbench_datasets.simulator.materials import reflection
 from uwbbench_datasets.simulator.shapes import Face, faces
-from uwbbench_datasets.simulator.terms.echo import CylinderEcho, PlateEcho, PlateParams, PointEcho, PointParams
+from uwbbench_datasets.simulator.terms.echo import (
+    CylinderEcho,
+    PlateEcho,
+    PlateParams,
+    PointEcho,
+    PointParams,
+    reflected,
+)
 from uwbbench_datasets.simulator.terms.walls import mirrored, walls
 
 _ECHOES = (
@@ -106,8 +112,7 @@ class WallGhost(Term[WallGhostParams]):
         return 2 * walls_sum * targets_sum * _largest_gain(view)
 
     def _reflected(self, view: View, wall: SceneObject) -> complex:
-        whole = reflection(wall.material, view.radar.center_frequency_hz, wall.thickness_m)
-        return whole * 10 ** (-self.params.loss_db / 20)
+        return reflected(wall, view.radar.center_frequency_hz) * 10 ** (-self.params.loss_db / 20)
 
     def paths(self, view: View, rng: np.random.Generator) -> Paths | None:
         """Two paths for each target and side of a wall."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 import numpy as np
 from pydantic import Field
 
@@ -16,6 +18,8 @@ class ClippingParams(Params):
 
 class Clipping(Term[ClippingParams]):
     """Saturation: I and Q each stop at a level, as registers do."""
+
+    of_robot: ClassVar = True
 
     def apply(self, responses: Responses, view: View, rng: np.random.Generator) -> Responses:
         """Clip every response.
@@ -46,6 +50,8 @@ class QuantisationParams(Params):
 
 class Quantisation(Term[QuantisationParams]):
     """Rounding of I and Q to integers, half to even; what does not fit stops at the last step."""
+
+    of_robot: ClassVar = True
 
     def _step(self, view: View) -> float:
         return float(self.params.full_scale * view.direct_amplitude / 2 ** (self.params.bits - 1))

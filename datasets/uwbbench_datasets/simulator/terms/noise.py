@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
@@ -28,6 +28,8 @@ class Noise(Term[NoiseParams]):
     The filter is the root raised cosine of IEEE 802.15.4 (roll-off 0.5), so that the noise has the raised cosine as
     its autocorrelation.
     """
+
+    of_robot: ClassVar = True
 
     def noise_rms(self, view: View) -> float:
         """Relative to the direct path."""

@@ -2,14 +2,24 @@
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 import numpy as np
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from uwbbench.api import ComplexArray, FloatArray, Params, Paths, Term, View
 
 
+class RingingTap(Params):
+    """One return of a robot whose ringing is known."""
+
+    delay_ns: float = Field(ge=0, description="After the direct path.")
+    level_db: float = Field(description="Power against the direct path.")
+    phase_deg: float = Field(0.0, description="Phase against the direct path.")
+
+
 class RingingParams(Params):
-    """Power-delay profile of the ringing."""
+    """Power-delay profile of the ringing, or the returns themselves."""
 
     level_db: float = Field(-9.0, description="Power against the direct path, before the decay.")
     decay_ns: float = Field(1.5, gt=0, description="Time in which the power falls by a factor e.")
@@ -18,32 +28,50 @@ class RingingParams(Params):
     returns: int = Field(12, ge=1, le=1000, description="Number of returns.")
     drift: float = Field(0.015, ge=0, le=1, description="Relative amplitude of a slow drift; 0 for none.")
     drift_period_s: float = Field(60.0, gt=0, description="Period of the drift.")
+    taps: list[RingingTap] | None = Field(
+        None, min_length=1, description="The returns themselves, in place of a profile that they are drawn from."
+    )
+
+    @model_validator(mode="after")
+    def _one_description(self) -> RingingParams:
+        profile = {"level_db", "decay_ns", "start_ns", "spacing_ns", "returns"} & self.model_fields_set
+        if self.taps is not None and profile:
+            raise ValueError(f"taps are the returns themselves; {sorted(profile)[0]} is of returns that are drawn")
+        return self
 
 
 class Ringing(Term[RingingParams]):
-    """Robot-fixed ringing: a decaying row of returns, drawn once a run, that drifts a little.
+    """Robot-fixed ringing: a decaying row of returns that drifts a little.
 
-    As it stays the same from frame to frame, a recorded background can remove it. It reaches both antennas alike.
+    As it stays the same from frame to frame, a recorded background can remove it. It reaches both antennas alike. The
+    returns are drawn once a run, or once for the robot where the scene names one; ``taps`` states them instead.
     """
 
+    of_robot: ClassVar = True
+
+    _delay_s: FloatArray
+    _level: FloatArray
     _strength: ComplexArray
     _turn: FloatArray
 
     def prepare(self, view: View, rng: np.random.Generator) -> View:
-        """Draw the returns of the run."""
+        """Draw the returns, or take those that are known."""
         p = self.params
-        self._strength = (rng.normal(size=p.returns) + 1j * rng.normal(size=p.returns)) / np.sqrt(2)
-        self._turn = rng.uniform(0, 2 * np.pi, p.returns)
+        if p.taps is not None:
+            delay_ns, level_db, phase_deg = np.array([[tap.delay_ns, tap.level_db, tap.phase_deg] for tap in p.taps]).T
+            self._delay_s = np.asarray(delay_ns * 1e-9, float)
+            self._level = np.asarray(10 ** (level_db / 20), float)
+            self._strength = np.exp(1j * np.radians(phase_deg))
+        else:
+            self._delay_s = np.asarray((p.start_ns + np.arange(p.returns) * p.spacing_ns) * 1e-9, float)
+            power = 10 ** (p.level_db / 10) * np.exp(-self._delay_s / (p.decay_ns * 1e-9))
+            self._level = np.asarray(np.sqrt(power), float)
+            self._strength = (rng.normal(size=p.returns) + 1j * rng.normal(size=p.returns)) / np.sqrt(2)
+        self._turn = rng.uniform(0, 2 * np.pi, len(self._delay_s))
         return view
 
-    def _delay_s(self) -> FloatArray:
-        return np.asarray(
-            (self.params.start_ns + np.arange(self.params.returns) * self.params.spacing_ns) * 1e-9, float
-        )
-
     def _amplitude(self, view: View) -> ComplexArray:
-        power = 10 ** (self.params.level_db / 10) * np.exp(-self._delay_s() / (self.params.decay_ns * 1e-9))
-        return np.asarray(view.direct_amplitude * np.sqrt(power) * self._strength)
+        return np.asarray(view.direct_amplitude * self._level * self._strength)
 
     def bound(self, view: View) -> float:
         """All returns in phase, at the top of their drift."""
@@ -53,4 +81,4 @@ class Ringing(Term[RingingParams]):
         """One path for each return."""
         turn = 2 * np.pi * view.timestamp_s[:, None] / self.params.drift_period_s + self._turn
         amplitude = self._amplitude(view) * (1 + self.params.drift * np.sin(turn))
-        return Paths(self._delay_s()[None], amplitude, np.zeros((1, self.params.returns)))
+        return Paths(self._delay_s[None], amplitude, np.zeros((1, len(self._delay_s))))

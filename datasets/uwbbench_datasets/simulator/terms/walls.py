@@ -9,9 +9,8 @@ import numpy as np
 from pydantic import Field
 
 from uwbbench.api import ComplexArray, FloatArray, Params, Paths, SceneObject, Term, View
-from uwbbench_datasets.simulator.materials import reflection
 from uwbbench_datasets.simulator.shapes import Face, faces
-from uwbbench_datasets.simulator.terms.echo import face_echo
+from uwbbench_datasets.simulator.terms.echo import face_echo, reflected
 
 
 def walls(view: View) -> Iterator[tuple[int, SceneObject]]:
@@ -60,7 +59,7 @@ class WallEcho(Term[WallParams]):
     def _all(self, view: View, *, bound: bool) -> Paths | None:
         points, amplitudes = [], []
         for column, wall in walls(view):
-            strength = reflection(wall.material, view.radar.center_frequency_hz, wall.thickness_m)
+            strength = reflected(wall, view.radar.center_frequency_hz)
             for face in faces(wall):
                 seen = self._mirror(face, view) if self.params.infinite else self._finite(face, view, bound=bound)
                 points.append(seen[0])
@@ -74,10 +73,13 @@ class ClutterParams(Params):
     per_m2: float = Field(0.5, gt=0, le=1000, description="Mean number of scatterers on a square metre of wall.")
     rcs_m2: float = Field(0.01, gt=0, description="Mean radar cross section of a scatterer.")
     depth_m: float = Field(0.1, ge=0, description="Scatterers stand out from the wall by up to this.")
+    seed: int | None = Field(
+        None, ge=0, description="Of a room whose scatterers are the same in all runs; drawn once a run if left out."
+    )
 
 
 class WallClutter(Term[ClutterParams]):
-    """Weak echoes of sockets, frames and shelves: points scattered over the walls, drawn once a run.
+    """Weak echoes of sockets, frames and shelves: points scattered over the walls, drawn once a run or once for all.
 
     Their number is Poisson's, their cross section exponential (Swerling's first case), their places even; each echo
     follows the radar equation. They stand still in the world and are the same for all receivers.
@@ -89,6 +91,7 @@ class WallClutter(Term[ClutterParams]):
     def prepare(self, view: View, rng: np.random.Generator) -> View:
         """Draw the scatterers of both sides of each wall."""
         p = self.params
+        rng = rng if p.seed is None else np.random.Generator(np.random.SFC64(p.seed))
         self._scatterers = []
         for column, wall in walls(view):
             for face in faces(wall):
