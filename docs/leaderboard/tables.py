@@ -107,8 +107,9 @@ def readme_text(board: Board) -> str:
         lines.append(f"| {' | '.join([f'`{name}`', *cells, _time(board.of(board.timed[0]), name)])} |")
     units = int(board.figures["captures"].max())
     text = (
-        f"Suite `{board.name}`, version {board.version[:12]}, SIMULATED: F1 by object within 20 cm over {units} captures "
-        "a column, and in brackets the ranks that a detector may have among the others; **bold** may be the first. "
+        f"Suite `{board.name}`, version {board.version[:12]}, SIMULATED: F1 by object within 20 cm over {units} "
+        "captures a column, and in brackets the ranks that a detector may have among the others; **bold** may be the "
+        "first. "
         f"`{'`, `'.join(board.references)}` are no detectors but bounds. Times from samples to rows, in times of "
         f"`paper-filtering`, measured in turns on {board.machine}."
     )

@@ -75,7 +75,9 @@ def test_a_changed_capture_stops_the_run_and_is_named(suite: Path, tmp_path: Pat
         data["version"] = replace(read_frozen(suite), captures=marks(data)).version_of(rules)
 
     changed_lock(suite, other)
-    with pytest.raises(ChangedCapture, match=rf"suite 'tiny', version \w+: capture '{name}' of dataset 'plate' was cha"):
+    with pytest.raises(
+        ChangedCapture, match=rf"suite 'tiny', version \w+: capture '{name}' of dataset 'plate' was cha"
+    ):
         quick_run(suite, tmp_path / "run")
 
 
