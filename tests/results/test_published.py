@@ -72,7 +72,12 @@ def test_published_rows_carry_the_printed_figures(report: Report) -> None:
 def test_a_small_table_opens_the_report_and_gives_published_here_and_difference(report: Report) -> None:
     sheet = sheets(report)[0]
     assert sheet.columns[:3] == ("after", "channel", "material")
-    assert sheet.columns[3:6] == ("F1 published", "here (SIMULATED)", "difference")
+    assert sheet.columns[3:6] == ("precision published", "here (SIMULATED)", "difference")
+    assert [name for name in sheet.columns if name.endswith("published")] == [
+        "precision published",
+        "recall published",
+        "MAE (cm) published",
+    ]
     assert [row[1:3] for row in sheet.rows] == [(str(channel), material) for channel, material in published.ROWS] * 2
     cells = {tuple(row[key] for key in ("table", "channel", "material", "metric")): row for row in report.published}
     assert len(cells) == 84
@@ -81,6 +86,8 @@ def test_a_small_table_opens_the_report_and_gives_published_here_and_difference(
         if metric == "mae":
             np.testing.assert_equal(cell["here"], here.get((table, channel, material), np.nan))
             np.testing.assert_allclose(cell["difference"], cell["here"] - cell["published"])
+            assert not cell["low"] > cell["here"]
+            assert not cell["high"] < cell["here"]
     assert {cell["source"] for cell in cells.values() if cell["source"]} == {"simulated"}
     assert "reported by source" in sheet.notes[0]
 
@@ -94,13 +101,13 @@ def test_page_and_terminal_show_the_small_table(report: Report, capsys: pytest.C
 
 def test_peaks_through_the_chain_stand_beside_those_of_the_paper(report: Report) -> None:
     sheet = titled(report, "Peaks through the chain")
-    assert sheet.rows[-1][2:] == ("5601", "444", "225", "89")
+    assert sheet.rows[-1][2:] == ("1", "5601", "444", "225", "89")
     for row in sheet.rows[:-1]:
-        counts = [int(count) for count in row[2:]]
+        counts = [int(count) for count in row[3:]]
         assert counts == sorted(counts, reverse=True)
         assert counts[0] > 0
     chains = report.chains.set_index(["dataset", "step"])["count"]
-    assert sheet.rows[0][2] == str(chains["metal 5", "peaks"])
+    assert sheet.rows[0][3] == str(chains["metal 5", "peaks"])
 
 
 def test_a_run_that_does_not_cover_the_paper_is_not_compared_with_it(tmp_path) -> None:

@@ -1,4 +1,4 @@
-"""Score regions of single datasets of an experiment: stored, verified, scored again with, and absent where not given."""
+"""Score regions of single datasets of an experiment: stored, verified, scored again with, absent where not given."""
 
 from dataclasses import replace
 from pathlib import Path

@@ -71,6 +71,35 @@ def test_a_scenes_terms_follow_from_their_use(scene, term) -> None:
 
 
 @pytest.mark.parametrize(
+    "line",
+    [
+        "robot: rover",
+        "robot_seed: 3",
+        "seed: {by_channel: {5: 1, 9: 2}}",
+        "radar: {taps: {by_channel: {5: 50, other: 60}}}",
+        "objects: [{id: a, shape: point, center_m: [1, 0], tail: {level_db: {by_channel: {9: -3}}}}]",
+    ],
+)
+def test_a_scene_may_name_its_robot_and_values_by_channel(scene, line: str) -> None:
+    text = "schema: 1\ntrajectory: {kind: static, duration_s: {by_channel: {9: 1}}}\nterms: [{use: direct}]\n"
+    assert errors(scene, text + line) == []
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "robot: {seed: 3}",
+        "robot_seed: three",
+        "seed: {by_channel: {five: 1}}",
+        "radar: {channel: {by_channel: {5: 5}}}",
+        "objects: [{id: a, shape: point, center_m: [1, 0], tail: {level_db: {by_channel: {9: low}}}}]",
+    ],
+)
+def test_a_scene_with_a_wrong_robot_or_table_does_not_fit(scene, line: str) -> None:
+    assert errors(scene, f"schema: 1\ntrajectory: {{kind: static, duration_s: 1}}\nterms: [{{use: direct}}]\n{line}\n")
+
+
+@pytest.mark.parametrize(
     "step",
     [
         "{use: peaks, params: {relative_height: 0.5, window_taps: null}}",

@@ -28,6 +28,7 @@ from uwbbench.config.detector import from_results, marked
 from uwbbench.measure.accuracy.metrics.choice import MetricChoice
 from uwbbench.measure.accuracy.stats import Estimate
 from uwbbench.results import published
+from uwbbench.results.chains import chains_of
 from uwbbench.results.error_causes import ErrorCauses, error_causes
 from uwbbench.results.limits import Limits
 from uwbbench.results.pareto import speeds_of_run
@@ -250,20 +251,8 @@ class Report:
 
     @cached_property
     def chains(self) -> pd.DataFrame:
-        """Detections left behind each step, one row for each detector, dataset and step, captures added up."""
-        import pandas as pd
-
-        counts: dict[tuple[str, str, str], int] = defaultdict(int)
-        for entry in self._of_kind("accuracy"):
-            for step, count in entry.facts["chain"].items():
-                counts[entry.detector, entry.dataset, step] += count
-            detections = self.folder.detections(entry.unit)
-            if "cluster" in detections:
-                counts[entry.detector, entry.dataset, "in clusters"] += int((detections["cluster"] >= 0).sum())
-        rows = [(*key, count) for key, count in counts.items()]
-        datasets = [used["label"] for used in self.experiment["datasets"]]
-        rows.sort(key=lambda row: (self.detectors.index(row[0]), datasets.index(row[1])))
-        return pd.DataFrame(rows, columns=["detector", "dataset", "step", "count"])
+        """Detections left behind each step of each detector on each dataset: all, and the mean of a capture."""
+        return chains_of(self.folder, self._of_kind("accuracy"))
 
     @cached_property
     def limits(self) -> Limits:

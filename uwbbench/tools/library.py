@@ -26,17 +26,7 @@ if TYPE_CHECKING:
     from uwbbench.tools.gate import GateResult
     from uwbbench.tools.tune import TuneOutcome
 
-__all__ = [
-    "Leaderboard",
-    "compare",
-    "gate",
-    "leaderboard",
-    "open_dataset",
-    "open_run",
-    "plot",
-    "run",
-    "tune",
-]
+__all__ = ["Leaderboard", "compare", "gate", "leaderboard", "open_dataset", "open_run", "plot", "run", "tune"]
 
 PICTURES = (".png", ".svg", ".pdf")
 

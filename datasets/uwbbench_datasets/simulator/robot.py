@@ -161,7 +161,9 @@ class Robot:
         """
         for name in self.model.channels[channel].terms:
             if name not in terms:
-                raise ConfigError(f"{place}: {self} has a '{name}', which is no term of the scene: add {{use: {name}}}")
+                raise ConfigError(
+                    f"{place}: {self} describes the term '{name}', which the scene lacks: add {{use: {name}}}"
+                )
 
 
 def read_robot(name: str, folder: Path, place: str) -> Robot:

@@ -40,11 +40,28 @@ def speckle(body: SceneObject, view: View, part: str, length_m: float, seed: int
 
 
 def swing(body: SceneObject, view: View, part: str, length_m: float, seed: int = 0) -> FloatArray:
-    """Real pattern (frames,) of mean 0 and variance 1: see :func:`speckle`; at most ``sqrt(2)`` of :data:`LARGEST`."""
+    """Real pattern (frames,) of mean 0 and variance 1, at most ``sqrt(2)`` of :data:`LARGEST`.
+
+    Parameters
+    ----------
+    body, view, part, length_m, seed
+        As of :func:`speckle`, of which it is the real part.
+    """
     return np.asarray(np.sqrt(2) * speckle(body, view, part, length_m, seed).real)
 
 
 def drawn_for(body: SceneObject, view: View, part: str, seed: int) -> np.random.Generator:
-    """Random stream of one part of an object on one carrier, the same in all runs and scenes."""
+    """Random stream of one part of an object on one carrier, the same in all runs and scenes.
+
+    Parameters
+    ----------
+    body : SceneObject
+        Its name alone counts.
+    view : View
+        Its carrier frequency alone counts.
+    part : str
+    seed : int
+        Another stream for the same part.
+    """
     key = f"{body.name}/{part}/{view.radar.center_frequency_hz:.0f}"
     return np.random.Generator(np.random.SFC64(np.random.SeedSequence(seed, spawn_key=(zlib.crc32(key.encode()),))))

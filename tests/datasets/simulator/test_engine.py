@@ -186,3 +186,31 @@ def test_hooks_that_a_term_does_not_have_cost_nothing(scene) -> None:
     assert costs["direct"].pulses == len(simulate(scene()).captures[0])
     assert costs["noise"].pulses == 0
     assert Term.paths is load_plugin("terms", "noise").paths
+
+
+def test_captures_of_earlier_versions_come_out_again(run_scene) -> None:
+    """Samples written down before scenes could name a robot: another order of draws gives others altogether."""
+    box = {"id": "box", "shape": "box", "center_m": [1.5, 0.8], "yaw_deg": 180, "material": "plywood"}
+    objects = [
+        {"id": "plate", "shape": "plate", "center_m": [2.0, 0.1], "yaw_deg": 180, "width_m": 0.25, "height_m": 0.28},
+        {**box, "width_m": 0.3, "depth_m": 0.3, "height_m": 0.3},
+        {"id": "post", "shape": "point", "center_m": [1.2, -0.5]},
+        {"id": "wall", "shape": "wall", "center_m": [3.0, 0.0], "yaw_deg": 180, "width_m": 4.0, "material": "concrete"},
+    ]
+    uses = "direct antenna array ringing echo.plate echo.point echo.wall clutter.wall ghost.wall grid frame_gain noise"
+    capture = run_scene(
+        [{"use": use} for use in [*uses.split(), "odometry"]],
+        receivers={"front": {"mount_position_m": [0.0, 0.125], "tx_position_m": [0.0, -0.125]}},
+        trajectory={"kind": "straight", "start_m": [0, 0], "end_m": [0.3, 0], "speed_m_s": 0.3},
+        objects=objects,
+    )
+    frame, tap = np.array([0, 17, 48]), np.array([8, 20, 27])
+    preamble = np.array([7643.8311 + 1007.8108j, 812.0195 + 335.7795j, -17.1987 + 63.6537j]) * 1e-6
+    second = np.array([-1856.4109 - 3944.3066j, 1004.8751 + 156.1976j, -36.4260 + 46.3488j]) * 1e-6
+    assert capture.sts2 is not None
+    assert capture.preamble[frame, tap] == pytest.approx(preamble, rel=0, abs=1e-9)
+    assert capture.sts2[frame, tap] == pytest.approx(second, rel=0, abs=1e-9)
+    assert capture.first_path_index is not None
+    assert capture.first_path_index[frame].tolist() == [6.953125, 6.921875, 6.78125]
+    assert capture.odometry_position_m is not None
+    assert capture.odometry_position_m[48, :2] == pytest.approx([0.29130326, -0.00069911], abs=1e-8)

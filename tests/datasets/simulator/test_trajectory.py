@@ -112,3 +112,23 @@ def test_an_endless_run_is_refused() -> None:
 def test_an_arc_of_no_angle_is_refused() -> None:
     with pytest.raises(ValidationError, match="kind: static"):
         made(kind="arc", center_m=[0, 0], radius_m=1, sweep_deg=0)
+
+
+def test_a_straight_way_halts_where_the_scene_says() -> None:
+    halts = [{"at_m": 0.0, "seconds": 1.0}, {"at_m": 0.6, "seconds": 2.0}, {"at_m": 1.0, "seconds": 0.5}]
+    track = made(kind="straight", start_m=[1, 0], end_m=[1, 1], speed_m_s=0.5, halts=halts)
+    assert track.timestamp_s[-1] == pytest.approx(1.0 / 0.5 + 3.5, abs=1 / RATE_HZ)
+    for second, at_m in ((0.0, 0.0), (1.0, 0.0), (1.6, 0.3), (2.2, 0.6), (4.2, 0.6), (5.0, 1.0), (5.5, 1.0)):
+        assert np.interp(second, track.timestamp_s, track.position_m[:, 1]) == pytest.approx(at_m, abs=0.02)
+    assert np.max(speed(track)) < 0.5 + 1e-9
+    assert np.allclose(track.yaw_rad, np.pi / 2)
+
+
+@pytest.mark.parametrize(
+    ("at_m", "message"),
+    [([1.2], "1.2 m lies behind the end of the way, 1 m"), ([0.5, 0.5], "0.5 m must lie behind the halt before")],
+)
+def test_halts_lie_on_the_way_one_behind_the_other(at_m: list[float], message: str) -> None:
+    halts = [{"at_m": one, "seconds": 1.0} for one in at_m]
+    with pytest.raises(ValidationError, match=message):
+        made(kind="straight", start_m=[0, 0], end_m=[1, 0], halts=halts)

@@ -294,7 +294,7 @@ def judge(detections: Detections, scene: Scene, rules: ScoringRules, table: Tabl
     else:
         missed = (there > 0) & ((retained if exhaustive else tp) == 0)
         if rules.scoring == "peak":
-            missed &= _has_true_candidate(detections, scene, rules, table)
+            missed &= _has_true_candidate(detections, missed, scene, rules, table)
         fn = missed.astype(np.int64)
     index = np.flatnonzero(scene.scored)
     outcome = Outcome(
@@ -349,8 +349,10 @@ def _nearest(error_m: FloatArray, among: BoolArray) -> FloatArray:
     return smallest
 
 
-def _has_true_candidate(detections: Detections, scene: Scene, rules: ScoringRules, table: Table) -> BoolArray:
-    """Frames (frames,) in which a peak before the filters lies within the gate of a visible obstacle."""
+def _has_true_candidate(
+    detections: Detections, asked: BoolArray, scene: Scene, rules: ScoringRules, table: Table
+) -> BoolArray:
+    """Those of the frames (frames,) asked for where a peak before the filters lies in a visible obstacle's gate."""
     candidates = detections.candidates
     if candidates is None:
         raise ScoringError(
@@ -360,6 +362,7 @@ def _has_true_candidate(detections: Detections, scene: Scene, rules: ScoringRule
     needed = "range_m" if table == "filtering" else "x_m"
     if len(candidates) and needed not in candidates:
         raise ScoringError(f"peak scoring: the peaks before the filters have no {needed}")
+    candidates = candidates.take(asked[candidates.frame])
     near = np.abs(scene.errors_m(candidates, table, rules.surface)) <= rules.gate_m
     true = (near & scene.visible(rules.region)[candidates.frame]).any(axis=1)
     return np.isin(np.arange(len(scene.header)), candidates.frame[true])

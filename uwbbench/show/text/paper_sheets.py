@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from uwbbench.results.report import Report
 
 _UNKNOWN = "not known"
-_COMPARED = ("f1", "mae")
+_COMPARED = ("precision", "recall", "mae")
 """Metrics of the small table; the others stand in the large ones."""
 
 
@@ -37,7 +37,8 @@ def published_sheets(report: Report) -> Iterator[Sheet]:
     heads = [head for _, by in shown_here for head in (f"{by.axis} published", here, "difference")]
     notes = [
         f"Published: reported by source, {published.NAME}, of its own recordings. Here: {shown(first['detector'])}, "
-        f"{first['scoring']} scoring, on {', '.join(datasets)}. Difference: here minus published.",
+        f"{first['scoring']} scoring, on {', '.join(datasets)}. Difference: here minus published, with the interval of "
+        "what is here.",
     ]
     if "SIMULATED" in sources:
         notes.append("A difference to simulated captures says how model and recordings differ, not who is right.")
@@ -45,9 +46,10 @@ def published_sheets(report: Report) -> Iterator[Sheet]:
 
 
 def _difference(cell: Mapping[str, Any], by: Quantity) -> tuple[str, str, str]:
-    """Published figure with its printed digits, the run's, and the difference with its sign."""
+    """Published figure with its printed digits, the run's, and the difference with its sign and interval."""
     digits = by.digits + 1
-    difference = number(cell["difference"], digits, by.factor)
+    low, high = (cell[end] - cell["published"] for end in ("low", "high"))
+    difference = interval(cell["difference"], low, high, digits, by.factor)
     signed = f"+{difference}" if cell["difference"] >= 0 else difference
     return number(cell["published"], digits, by.factor), number(cell["here"], digits, by.factor), signed
 
@@ -112,14 +114,14 @@ def _chain(report: Report) -> Sheet:
     steps = {title: published.STEPS.get(title, title) for title in published.CHAIN}
     rows = []
     for (detector, dataset), group in counts.groupby(["detector", "dataset"], sort=False):
-        left = dict(zip(group["step"], group["count"], strict=True))
+        left = {row["step"]: interval(row["mean"], row["low"], row["high"], 0) for row in group.to_dict("records")}
         if next(iter(steps.values())) in left:
-            rows.append(
-                (shown(str(detector)), shown(str(dataset)), *(str(left.get(step, "n/a")) for step in steps.values()))
-            )
-    rows.append((published.NAME, "its demonstration", *map(str, published.CHAIN.values())))
+            texts = (left.get(step, "n/a") for step in steps.values())
+            rows.append((shown(str(detector)), shown(str(dataset)), str(group["captures"].max()), *texts))
+    rows.append((published.NAME, "its demonstration", "1", *map(str, published.CHAIN.values())))
     notes = (
-        "Runs differ in length from the paper's, so compare the shares that are left. A detector that keeps the "
+        "Mean of one capture. Captures differ in length from the paper's, so compare the shares that are left, except "
+        "on scenes made after its demonstration. A detector that keeps the "
         "strongest peak of a frame drops the others behind the phase difference.",
     )
-    return Sheet("Peaks through the chain", ("detector", "dataset", *published.CHAIN), tuple(rows), notes)
+    return Sheet("Peaks through the chain", ("detector", "dataset", "captures", *published.CHAIN), tuple(rows), notes)

@@ -13,7 +13,7 @@ from uwbbench.api import registry
 from uwbbench.api.errors import ConfigError, nearest
 from uwbbench.api.metric import Outcome
 from uwbbench.detect.pipeline import Pipeline
-from uwbbench.measure.accuracy import intervals
+from uwbbench.measure.accuracy.counts import mean_count
 from uwbbench.measure.accuracy.scoring import outcomes
 from uwbbench.measure.accuracy.stats import estimated, evaluate
 from uwbbench.tools.fit.config import CHAIN, IN_CLUSTERS, Cell, Target
@@ -54,22 +54,14 @@ class Found:
     def ends(self, target: Target) -> tuple[float, float]:
         """Interval of 95 % of the figure, each draw being one piece of evidence; NaN where there is none."""
         if target.table == CHAIN:
-            return _ends_of_mean(self._counts(target))
+            _, low, high, *_ = mean_count(self._counts(target))
+            return float(low), float(high)
         made = self.outcomes.get(target.table, [])
         estimate = estimated(registry.load_plugin("metrics", target.metric), made, range(len(made)))
         return estimate.low, estimate.high
 
     def _counts(self, target: Target) -> list[float]:
         return [float(counts.get(target.metric, 0)) for counts in self.counts]
-
-
-def _ends_of_mean(values: Sequence[float]) -> tuple[float, float]:
-    """Student's interval of a mean, which may not fall below 0."""
-    if len(values) < 2:
-        return math.nan, math.nan
-    freedom = np.array(len(values) - 1.0)
-    reach = float(intervals.student(freedom)) * float(np.std(values, ddof=1)) / math.sqrt(len(values))
-    return max(0.0, float(np.mean(values)) - reach), float(np.mean(values)) + reach
 
 
 def run_cell(files: Files, cell: Cell, seeds: Sequence[int], runs: int) -> Found:
