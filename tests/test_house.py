@@ -3,6 +3,7 @@
 import ast
 import re
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -55,6 +56,11 @@ def plugin_names() -> frozenset[str]:
     return frozenset(names)
 
 
+@cache
+def parsed(path: Path) -> ast.Module:
+    return ast.parse(path.read_text(encoding="utf-8"))
+
+
 def constants(tree: ast.AST) -> Iterator[ast.Constant]:
     """Texts that a program computes with: no docstrings, and no pieces of longer texts."""
     apart = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
@@ -83,9 +89,8 @@ def _is_use(key: ast.expr | None) -> bool:
     return isinstance(key, ast.Constant) and key.value == "use"
 
 
-def plugins_named(source: str, names: frozenset[str]) -> list[tuple[int, str]]:
+def plugins_named(tree: ast.AST, names: frozenset[str]) -> list[tuple[int, str]]:
     """Line and text of each place of a module that names a plugin."""
-    tree = ast.parse(source)
     expected = {id(place) for place in places_of_names(tree)}
     found = []
     for text in constants(tree):
@@ -111,7 +116,7 @@ def plugins_named(source: str, names: frozenset[str]) -> list[tuple[int, str]]:
     ],
 )
 def test_a_name_of_a_plugin_is_told_from_a_word_of_the_framework(source, named):
-    assert [text for _, text in plugins_named(source, plugin_names())] == named
+    assert [text for _, text in plugins_named(ast.parse(source), plugin_names())] == named
 
 
 def test_the_framework_names_no_plugin():
@@ -120,17 +125,13 @@ def test_the_framework_names_no_plugin():
     found = [
         f"{path.relative_to(ROOT)}:{line}: {text!r}"
         for path in sorted(FRAMEWORK.rglob("*.py"))
-        for line, text in plugins_named(path.read_text(encoding="utf-8"), names)
+        for line, text in plugins_named(parsed(path), names)
     ]
     assert found == []
 
 
 def test_every_word_that_is_allowed_is_the_name_of_a_plugin_and_is_used():
-    texts = {
-        text.value
-        for path in FRAMEWORK.rglob("*.py")
-        for text in constants(ast.parse(path.read_text(encoding="utf-8")))
-    }
+    texts = {text.value for path in FRAMEWORK.rglob("*.py") for text in constants(parsed(path))}
     assert WORDS.keys() <= plugin_names() & texts
 
 
@@ -163,7 +164,7 @@ def test_no_module_is_imported_by_a_name_in_a_text():
         f"{path.relative_to(ROOT)}:{node.lineno}"
         for folder in (FRAMEWORK, *PLUGINS)
         for path in sorted(folder.rglob("*.py"))
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        for node in ast.walk(parsed(path))
         if isinstance(node, ast.Call) and ast.unparse(node.func).endswith("import_module")
         if any(
             isinstance(part, ast.Constant) and str(part.value).startswith("uwbbench") for part in ast.walk(node.args[0])

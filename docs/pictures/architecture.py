@@ -12,6 +12,7 @@ from __future__ import annotations
 import ast
 import tomllib
 from collections import defaultdict
+from functools import cache
 from pathlib import Path
 from typing import Any
 from xml.sax.saxutils import escape
@@ -51,6 +52,7 @@ def sub_rooms(room: str) -> list[str]:
     return sorted(path.parent.name for path in (ROOT / "uwbbench" / room).glob("*/__init__.py"))
 
 
+@cache
 def imports() -> tuple[set[tuple[str, str]], set[tuple[str, str]]]:
     """Pairs of places of which the first imports the second, and those that only excused imports join.
 

@@ -31,7 +31,8 @@ from harness import (
 )
 
 from uwbbench.api import Capture, Detections, FloatArray, Frames
-from uwbbench.detect.pipeline import BATCH_FRAMES, Pipeline, load_detector
+from uwbbench.api.frames import BATCH_FRAMES
+from uwbbench.detect.pipeline import Pipeline, load_detector
 
 FRAME_COUNTS = (1_000, 10_000, 100_000, 1_000_000)
 TAP_COUNTS = (50, 100, 200, 400, 1016)

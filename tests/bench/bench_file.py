@@ -14,7 +14,8 @@ import frames as made
 from harness import Effort, Row, alone, at_most, once, told
 
 from uwbbench.api.capture_file import open_capture, write_capture
-from uwbbench.detect.pipeline import BATCH_FRAMES, load_detector
+from uwbbench.api.frames import BATCH_FRAMES
+from uwbbench.detect.pipeline import load_detector
 
 FRAMES = 1_000_000
 DISTINCT = 20_000

@@ -67,6 +67,7 @@ def verdicts(told: dict) -> list[str]:
     return [check["verdict"] for check in told["checks"]]
 
 
+@pytest.mark.slow
 def test_a_gate_that_holds_is_exit_code_0_and_is_told_for_people(uwbbench, make_gate) -> None:
     make_gate(
         accuracy="[{metric: f1, scoring: frame, minimum: 0.5}, {metric: mae, scoring: object, maximum: 1.0}]",

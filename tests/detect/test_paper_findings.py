@@ -82,6 +82,7 @@ def found_share(material: str, channel: int, span_m: tuple[float, float]) -> flo
     return hits / frames
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("channel", [5, 9])
 @pytest.mark.parametrize("material", ["metal", "concrete", "plywood"])
 def test_prominence_falls_with_distance_beyond_the_ringing(material: str, channel: int) -> None:

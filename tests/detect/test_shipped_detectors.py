@@ -263,6 +263,22 @@ def test_two_strongest_detections_find_the_reflectors_of_the_measured_rail(name,
 
 
 @pytest.mark.data
+@pytest.mark.parametrize(
+    ("name", "least_tree", "least_walk"),
+    [("background-mean", 12, 0.75), ("background-ema", 10, 0.75), ("cfar-ca", 7, 0.7), ("cfar-os", 6, 0.7)],
+)
+def test_settings_hold_on_other_recordings_of_such_radars(name, least_tree, least_walk, data_dir):
+    """Chance finds the tree at one stop of 23 and the person in 0.12 of the frames."""
+    tree = open_dataset("pulson440-tree", {}, [data_dir]).open("trial_1")
+    found = score(load_detector(name).run(tree), tree, "object", 0.20, Region(4.5, 12.0), strongest=1).filtering
+    assert found.tp >= least_tree
+    walk = open_dataset("et4173-walk", {}, [data_dir])
+    for node, share in (("101", least_walk), ("102", least_walk - 0.15)):
+        capture = walk.open(node)
+        assert score(load_detector(name).run(capture), capture, "frame", 0.30).filtering.recall >= share
+
+
+@pytest.mark.data
 def test_printed_form_names_the_channels_it_knows(rail):
     with pytest.raises(ConfigError, match="channels 5, 9"):
         load_detector("paper-as-printed").open(rail)

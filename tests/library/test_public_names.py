@@ -47,13 +47,18 @@ def test_a_name_that_does_not_exist_is_refused():
     "imports",
     [
         "import uwbbench",
-        "import uwbbench.run.execute\nimport uwbbench",
-        "from uwbbench.run import run_experiment\nimport uwbbench",
+        pytest.param("import uwbbench.run.execute\nimport uwbbench", marks=pytest.mark.slow),
         "import uwbbench\nbefore = uwbbench.run\nimport uwbbench.run.execute\nassert before is uwbbench.run",
-        "import uwbbench.cli\nimport uwbbench.run.experiment as room\nassert room.read_experiment\nimport uwbbench",
-        "from uwbbench import run\nimport uwbbench\nimport uwbbench.run.folder\nassert run is uwbbench.run",
-        "import importlib\nimportlib.import_module('uwbbench.run')\nimport uwbbench",
-        "import uwbbench\nuwbbench.run\nfrom uwbbench.run.execute import run_experiment",
+        *(
+            pytest.param(order, marks=pytest.mark.slow)
+            for order in (
+                "from uwbbench.run import run_experiment\nimport uwbbench",
+                "import uwbbench.cli\nimport uwbbench.run.experiment as room\nassert room\nimport uwbbench",
+                "from uwbbench import run\nimport uwbbench\nimport uwbbench.run.folder\nassert run is uwbbench.run",
+                "import importlib\nimportlib.import_module('uwbbench.run')\nimport uwbbench",
+                "import uwbbench\nuwbbench.run\nfrom uwbbench.run.execute import run_experiment",
+            )
+        ),
     ],
 )
 def test_run_can_be_called_in_whatever_order_things_are_imported(imports, tmp_path):

@@ -145,7 +145,7 @@ def test_an_unknown_dataset_names_the_nearest():
 
 
 @pytest.mark.data
-@pytest.mark.parametrize("name", ["pulson440-rail", "et4173-walk", "xethru-x4", "dw1000-apartment"])
+@pytest.mark.parametrize("name", ["pulson440-rail", "pulson440-tree", "et4173-walk", "xethru-x4", "dw1000-apartment"])
 def test_cards_hash_the_files_as_published(name, data_dir):
     adapter = load_plugin("datasets", name)
     assert adapter.card.files

@@ -52,6 +52,7 @@ def test_results_go_into_pytest_benchmarks_json_with_detector_and_capture(tmp_pa
     assert about["machine"]["cores"] >= 1
 
 
+@pytest.mark.slow
 def test_without_pytest_benchmark_it_skips_and_says_why(tmp_path) -> None:
     out = run_pytest(tmp_path, "-p", "no:benchmark")
     assert "3 skipped" in out

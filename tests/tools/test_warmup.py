@@ -102,6 +102,7 @@ def test_a_detector_of_another_package_is_compiled_for_all_kinds_of_samples(thei
     assert (again.compiled, again.loaded) == (0, 0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["paper", "cfar-ca"])
 def test_behind_the_warm_up_no_run_compiles_anything(name, approach, approach_without_sts, tmp_path: Path) -> None:
     assert [one.failure for one in warm_up([name])] == [None]

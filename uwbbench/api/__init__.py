@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from uwbbench.api.case import Evidence, NotApplicable, Violation, cases_of, hard_case
     from uwbbench.api.check import checked
     from uwbbench.api.compiling import compiled, inlined
-    from uwbbench.api.dataset import Card, Dataset, DatasetFile
+    from uwbbench.api.dataset import Card, Dataset, DatasetFile, DatasetFolder
     from uwbbench.api.detections import COLUMNS, Detections
     from uwbbench.api.errors import (
         CaptureError,
@@ -62,7 +62,7 @@ _HOME = {
     "case": ("Evidence", "NotApplicable", "Violation", "cases_of", "hard_case"),
     "check": ("checked",),
     "compiling": ("compiled", "inlined"),
-    "dataset": ("Card", "Dataset", "DatasetFile"),
+    "dataset": ("Card", "Dataset", "DatasetFile", "DatasetFolder"),
     "detections": ("COLUMNS", "Detections"),
     "errors": ("CaptureError", "ConfigError", "PluginError", "ScoringError", "StoreError", "UwbbenchError", "nearest"),
     "filters": ("Limit", "LimitFilter", "RankFilter", "RankParams"),
@@ -108,6 +108,7 @@ __all__ = [
     "ConfigError",
     "Dataset",
     "DatasetFile",
+    "DatasetFolder",
     "Detections",
     "EchoFading",
     "EchoTail",

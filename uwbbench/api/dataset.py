@@ -21,14 +21,43 @@ class DatasetFile:
     path : str
         Below the dataset's folder.
     sha256 : str
-        Hash of the file as published.
+        Hash of the file as published; empty where it is not known before the first download.
     url : str
         Where it can be downloaded, pinned to a commit or version.
+    size : int or None
+        Bytes, where the host says so.
+    git_sha1 : str
+        Git's own hash of the content at that commit, where the host says so: what a first download is checked against.
     """
 
     path: str
     sha256: str
     url: str
+    size: int | None = None
+    git_sha1: str = ""
+
+
+@dataclass(frozen=True)
+class DatasetFolder:
+    """Files published beside a dataset's own, which are downloaded only when they are asked for.
+
+    Nobody has vouched for their hashes yet: the host lists them at a pinned commit, with size and git hash, and the
+    SHA-256 of what a user's first download brought is recorded on his disk and holds from then on.
+
+    Attributes
+    ----------
+    name : str
+        What the user asks for, and the folder below the dataset's that the files go to.
+    listing : str
+        Address of the list, pinned to a commit: JSON as GitHub's contents API answers it
+        (https://docs.github.com/rest/repos/contents).
+    suffixes : tuple of str
+        Endings of the files that are wanted.
+    """
+
+    name: str
+    listing: str
+    suffixes: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -44,6 +73,8 @@ class Card:
     files : tuple of DatasetFile
         What ``uwbbench fetch`` downloads; empty where the user brings the files.
     origin : {"measured", "simulated"}
+    more : tuple of DatasetFolder
+        What ``uwbbench fetch --more`` downloads besides.
     """
 
     title: str
@@ -53,6 +84,7 @@ class Card:
     folder: str = ""
     files: tuple[DatasetFile, ...] = field(default=())
     origin: Literal["measured", "simulated"] = "measured"
+    more: tuple[DatasetFolder, ...] = field(default=())
 
 
 class Dataset(Generic[P]):

@@ -12,6 +12,10 @@ import numpy as np
 
 from uwbbench.api.arrays import BoolArray, ComplexArray, FloatArray, IntArray, locked
 
+BATCH_FRAMES = 4096
+"""Frames of a block where a whole capture is read: enough to be fast, as a compressed file is slow to give them one by
+one, and few enough for a capture of a million."""
+
 
 def magnitude(samples: ComplexArray) -> FloatArray:
     """``sqrt(re^2 + im^2)`` in double precision.

@@ -91,3 +91,8 @@ def summary(docstring: str | None) -> str:
     'Peaks of a profile.'
     """
     return one_line(without_markup(inspect.cleandoc(docstring or "").partition("\n\n")[0]))
+
+
+def counted(number: int, what: str) -> str:
+    """So many of a noun that takes an s: ``1 scene``, ``6 scenes``."""
+    return f"{number} {what}{'' if number == 1 else 's'}"

@@ -92,17 +92,30 @@ def fetch(
     folder: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Instead of the cache, which is searched always.")
     ] = None,
+    more: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NAME", help="Also this folder of its 'more' (see 'uwbbench show'), or 'all'."),
+    ] = None,
 ) -> None:
-    """Download a published dataset. It is checked against its hashes."""
+    """Download a published dataset. It is checked against its hashes.
+
+    Of the folders that --more names no hash is published. They are checked against size and git hash of the commit that
+    they are taken from, their SHA-256 is recorded in hashes.json, and later downloads are checked against that.
+    """
     import uwbbench.tools.fetch
+    from uwbbench.api import registry
+
+    license_ = registry.load_plugin("datasets", dataset).card.license
 
     def report_file(file: Any, done: int, count: int) -> None:
-        typer.echo(f"{done + 1}/{count} {file.path}", err=True)
+        size = "" if file.size is None else f", {file.size / 1e6:.1f} MB, {license_}"
+        unverified = "" if file.sha256 else "; no SHA-256 known yet: unverified until checked against its commit"
+        typer.echo(f"{done + 1}/{count} {file.path}{size}{unverified}", err=True)
 
-    typer.echo(uwbbench.tools.fetch.fetch(dataset, folder, report_file))
+    typer.echo(uwbbench.tools.fetch.fetch(dataset, folder, report_file, more or ()))
 
 
 def register(app: typer.Typer) -> None:
     """Add these commands."""
     app.command(epilog="Example: uwbbench convert data/et4173-walk --dataset et4173-walk -o walk.h5")(convert)
-    app.command(epilog="Example: uwbbench fetch pulson440-rail")(fetch)
+    app.command(epilog="Example: uwbbench fetch pulson440-rail --more trial_3")(fetch)

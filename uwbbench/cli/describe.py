@@ -47,6 +47,7 @@ def _plugin(kind: Any, name: str) -> dict[str, Any]:
         card = cls.card
         facts |= {key: getattr(card, key) for key in ("title", "origin", "license", "citation", "source", "folder")}
         facts["files"] = [{"path": file.path, "sha256": file.sha256, "url": file.url} for file in card.files]
+        facts["more"] = [{"name": folder.name, "listing": folder.listing} for folder in card.more]
     elif kind == "terms":
         facts["fidelity"] = cls.fidelity
     else:

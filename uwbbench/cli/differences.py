@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from uwbbench.api.text import printable
+from uwbbench.api.text import counted, printable
 from uwbbench.cli import render
 from uwbbench.show.text.numbers import interval, number
 from uwbbench.show.text.quantity import Quantity
@@ -67,7 +67,7 @@ def _scores(comparison: Comparison) -> None:
                 number(change.after, by.digits, by.factor),
                 interval(d.value, d.low, d.high, by.digits, by.factor),
                 number(change.adjusted, 3),
-                f"{change.captures} captures, {d.groups} groups",
+                f"{counted(change.captures, 'capture')}, {counted(d.groups, 'scene')}",
             )
         )
     if rows:

@@ -83,7 +83,7 @@ def show(
             continue
         typer.echo(f"{kind} {name}  ({facts.pop('package')}, {facts.pop('target')})\n\n{facts.pop('doc')}\n")
         params = facts.pop("params", [])
-        files = facts.pop("files", [])
+        files, more = facts.pop("files", []), facts.pop("more", [])
         render.print_facts({key: ", ".join(v) if isinstance(v, list) else v for key, v in facts.items()})
         if params:
             typer.echo()
@@ -91,6 +91,9 @@ def show(
             render.print_table("parameters", columns, [[row[key] for key in columns] for row in params])
         if files:
             render.print_table("files", ("path", "sha256"), [(file["path"], file["sha256"]) for file in files])
+        if more:
+            rows = [(folder["name"], folder["listing"]) for folder in more]
+            render.print_table("more: no hash known before the first download", ("name", "listed at"), rows)
 
 
 def info(capture: options.CaptureFile, json: options.Json = False) -> None:

@@ -21,14 +21,11 @@ import numpy as np
 
 from uwbbench.api.capture import Capture
 from uwbbench.api.detections import HANDED_OUT, Detections
-from uwbbench.api.frames import Frames
+from uwbbench.api.frames import BATCH_FRAMES, Frames
 from uwbbench.detect.stream import Stream
 
 if TYPE_CHECKING:
     from uwbbench.detect.pipeline import Pipeline
-
-BLOCK_FRAMES = 4096
-"""Frames that are read at once, as a compressed file is slow to give them one by one."""
 
 FIRST_ALONE = 64
 """Frames that go in one by one before the blocks."""
@@ -100,7 +97,7 @@ def _at_once(stream: Stream, capture: Capture, found: Detections) -> bool:
 
 def _parts(stream: Stream, capture: Capture, lengths: Iterator[int]) -> Iterator[Frames]:
     """Consecutive parts of a capture of these lengths, or shorter where a block that is read at once ends."""
-    for block in capture.blocks(BLOCK_FRAMES, sts="sts" in stream.needs):
+    for block in capture.blocks(BATCH_FRAMES, sts="sts" in stream.needs):
         start = 0
         while start < len(block):
             stop = min(start + next(lengths), len(block))

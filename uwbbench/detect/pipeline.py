@@ -15,15 +15,13 @@ from uwbbench.api.block import Block
 from uwbbench.api.capture import Capture, CaptureHeader
 from uwbbench.api.detections import COLUMNS, Detections
 from uwbbench.api.errors import ConfigError, PluginError
+from uwbbench.api.frames import BATCH_FRAMES
 from uwbbench.api.kernel import Kernel
 from uwbbench.api.stage import Stage
 from uwbbench.config.detector import KERNEL, DetectorConfig, detector_from_text, detector_identity, read_detector
 from uwbbench.detect.hand_out import with_hand_outs
 from uwbbench.detect.sources import source_hash
 from uwbbench.detect.stream import Opened, Stream
-
-BATCH_FRAMES = 4096
-"""Frames a block of :meth:`Pipeline.run`: large enough to be fast, small enough for a million frames."""
 
 _NEEDS = {
     "sts": "STS responses of two antennas",

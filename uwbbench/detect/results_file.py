@@ -32,6 +32,7 @@ from uwbbench.api.arrays import BoolArray, FloatArray, IntArray
 from uwbbench.api.capture import Capture
 from uwbbench.api.detections import COLUMNS, Detections
 from uwbbench.api.errors import ScoringError
+from uwbbench.api.frames import BATCH_FRAMES
 from uwbbench.api.geometry import SPEED_OF_LIGHT_M_S, bistatic_range, direction
 from uwbbench.api.radar import Radar
 from uwbbench.config.detector import RESULTS_FILE
@@ -40,7 +41,6 @@ from uwbbench.detect.number_table import NumberTable, read_table
 SUFFIXES = (".csv", ".parquet")
 FRAMES_COLUMNS = ("frame", "time_us")
 
-BLOCK_FRAMES = 4096
 FAR_BEYOND = 2.0
 """A range this many times the radar's window is in another unit, whatever the others are."""
 SMALLEST_M = 1e-3
@@ -97,7 +97,7 @@ def read_results(path: Path, capture: Capture) -> ResultsFile:
     columns = {name: table[name] for name in given if name != "frame" and not np.isnan(table[name]).all()}
     notes = [f"column '{name}' is not read" for name in table.names if name not in COLUMNS]
     columns["range_m"] = _ranges(table, columns, capture.radar, notes)
-    valid = np.concatenate([np.empty(0, bool), *(block.valid for block in capture.blocks(BLOCK_FRAMES))])
+    valid = np.concatenate([np.empty(0, bool), *(block.valid for block in capture.blocks(BATCH_FRAMES))])
     processed, times_us = np.flatnonzero(valid), None
     if listed:
         processed, times_us = _processed(listed[0], table, frame, capture, valid)

@@ -23,6 +23,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from uwbbench.api.text import counted
 from uwbbench.measure.accuracy.boards import RANKED_UNITS, Verdict, holm, rank_sets, verdict
 from uwbbench.measure.accuracy.evidence import WITHIN_SCENES
 from uwbbench.measure.accuracy.intervals import CONFIDENCE, INNER_UNITS
@@ -162,8 +163,7 @@ class Ranks:
         if len(self.order) == 1:
             return f"{first} has {figures}"
         if not self.sets:
-            what = "1 scene" if self.scenes == 1 else f"{self.scenes} scenes"
-            return f"{text}, but {what} cannot rank (six can)"
+            return f"{text}, but {counted(self.scenes, 'scene')} cannot rank (six can)"
         others = [names[key] for key in self.top if key != self.order[0]]
         if self.order[0] not in self.top or not others:
             return text

@@ -89,7 +89,7 @@ class DetectorBenchmark:
 
     def _batch(self, pipeline: Pipeline, capture: Capture, frames: Capture, rounds: int | None) -> None:
         """The whole capture a round, each time with a fresh stream."""
-        from uwbbench.detect.pipeline import BATCH_FRAMES
+        from uwbbench.api.frames import BATCH_FRAMES
 
         def fresh() -> tuple[tuple[Any, ...], dict[str, Any]]:
             return (pipeline.open(capture),), {}

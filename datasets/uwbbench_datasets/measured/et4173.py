@@ -23,10 +23,10 @@ from uwbbench.api import (
     Truth,
     nearest,
 )
-from uwbbench_datasets.measured.pulson440 import BANDWIDTH_HZ, BIN_S, CENTER_FREQUENCY_HZ
+from uwbbench_datasets.measured.pulson440 import BANDWIDTH_HZ, BIN_S, CENTER_FREQUENCY_HZ, DEVICE_OFFSET_S
 from uwbbench_datasets.measured.recordings import mean_frame_rate_hz
 
-_FIELDS = ("scn", "Tstmp", "Nbin")
+_FIELDS = ("scn", "Tstmp", "Nbin", "Tstrt")
 _RAW = (
     "https://raw.githubusercontent.com/Hong-01/"
     "ET4173-Clutter-Suppression-for-Positioning-with-Multiple-UWB-Radars/"
@@ -34,7 +34,7 @@ _RAW = (
 )
 
 
-def read_scans(path: Path) -> tuple[FloatArray, FloatArray, float]:
+def read_scans(path: Path) -> tuple[FloatArray, FloatArray, float, float]:
     """Scans of one node.
 
     Returns
@@ -44,6 +44,8 @@ def read_scans(path: Path) -> tuple[FloatArray, FloatArray, float]:
     timestamp_s : (frames,) array
         From the first scan.
     sample_interval_s : float
+    start_s : float
+        Delay of bin 0 as the device counts it.
 
     Raises
     ------
@@ -74,30 +76,33 @@ def read_scans(path: Path) -> tuple[FloatArray, FloatArray, float]:
         if wrong:
             expected = "one row of numbers, as long as the first" if dimensions else "one number"
             raise CaptureError(f"{path}: scn({wrong[0] + 1}).{name} must be {expected}")
-    samples, milliseconds, steps = (np.array(columns[name], float) for name in _FIELDS)
+    samples, milliseconds, steps, starts_ps = (np.array(columns[name], float) for name in _FIELDS)
     if samples.size == 0:
         raise CaptureError(f"{path}: 'scn' is empty")
     if not np.all(steps == steps[0]) or not steps[0] >= 1:
         raise CaptureError(f"{path}: Nbin, the step from bin to bin, must be positive and the same in every scan")
-    return samples, (milliseconds - milliseconds[0]) / 1000, float(steps[0]) * BIN_S
+    if not np.all(starts_ps == starts_ps[0]):
+        raise CaptureError(f"{path}: Tstrt, the delay of bin 0, must be the same in every scan")
+    return samples, (milliseconds - milliseconds[0]) / 1000, float(steps[0]) * BIN_S, float(starts_ps[0]) * 1e-12
 
 
 class Et4173WalkParams(Params):
-    """The constant that was fitted to the recording."""
+    """Where ranges count from."""
 
-    range_offset_m: float = Field(
-        1.112, description="Range of bin 0; fitted so that the person's leading edge lies on the path."
+    range_offset_m: float | None = Field(
+        None, description="Range of bin 0; null: by the device's own count, which puts it at 1.124 m."
     )
 
 
 class Et4173Walk(Dataset[Et4173WalkParams]):
     """Two of four fixed PulsON nodes; one person walks (1, -1), (1, 1), (-1, 1), (1, -1) m.
 
-    **Range.** Bin 0 is at ``range_offset_m``, fitted, which puts the *leading edge* of the person on the path. The
-    device's own start of 17.499 ns, less the 10 ns of its sisters, would be 1.124 m.
+    **Range.** Bin 0 is where the device counts it, ``c (Tstrt - 10 ns) / 2``, 1.124 m, with the same 10 ns as the
+    other PulsON recordings. A fit that puts the *leading edge* of the person on the path gives 1.112 m; it is not used.
 
-    **Truth** is the path, straight between four corners at fitted frames: a moving point at the person's leading edge,
-    NaN before the first corner and after the last. The person is 0.37 m wide: score with a gate of 0.20 m or wider.
+    **Truth** is the path, straight between four corners. When the person passes them is nowhere noted: the frames are
+    **fitted on the echo of the person**, who is scored. A moving point at the person's leading edge, NaN before the
+    first corner and after the last. The person is 0.37 m wide: score with a gate of 0.20 m or wider.
     The truth is not exhaustive, and two-dimensional, as heights are unknown.
 
     **Poses.** Node 101 stands at (-2, 2) m, node 102 at (2, 2) m. The axes of the published path do not show where the
@@ -142,7 +147,8 @@ class Et4173Walk(Dataset[Et4173WalkParams]):
         if name not in self.nodes_m:
             raise CaptureError(f"no node '{name}'.{nearest(name, self.nodes_m)}")
         path = self.file(f"{name}_P1.mat")
-        samples, timestamp_s, sample_interval_s = read_scans(path)
+        samples, timestamp_s, sample_interval_s, start_s = read_scans(path)
+        offset_m = self.params.range_offset_m
         frames = len(samples)
         x_m, y_m = self.nodes_m[name]
         radar = Radar(
@@ -154,7 +160,7 @@ class Et4173Walk(Dataset[Et4173WalkParams]):
             taps=samples.shape[1],
             samples="rf",
             receiver=name,
-            first_tap_delay_s=2 * self.params.range_offset_m / SPEED_OF_LIGHT_M_S,
+            first_tap_delay_s=start_s - DEVICE_OFFSET_S if offset_m is None else 2 * offset_m / SPEED_OF_LIGHT_M_S,
         )
         person = Obstacle("person", "person", self._path(frames)[:, None, :])
         return Capture(
@@ -166,7 +172,9 @@ class Et4173Walk(Dataset[Et4173WalkParams]):
             truth=Truth((person,), exhaustive=False),
             license=self.card.license,
             citation=self.card.citation,
-            description="One walking person; truth is the leading edge, its range offset and corner times are fitted.",
+            description="One person walking along a known path; "
+            + ("range by the device's own count" if offset_m is None else f"bin 0 at {offset_m:g} m as given")
+            + "; when the person passes the corners is FITTED ON THE SCORED OBJECT.",
             preamble=samples.astype(np.float32),
             receivers=tuple(self.nodes_m),
         )

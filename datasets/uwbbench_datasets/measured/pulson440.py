@@ -21,6 +21,7 @@ from uwbbench.api import (
     Card,
     Dataset,
     DatasetFile,
+    DatasetFolder,
     FloatArray,
     Obstacle,
     Params,
@@ -29,7 +30,8 @@ from uwbbench.api import (
     Truth,
     nearest,
 )
-from uwbbench_datasets.measured.optitrack import read_motion, z_up
+from uwbbench_datasets.measured.onset import REST_S, moved_by_poses_m, moved_by_scans_m, onset_s, span_s
+from uwbbench_datasets.measured.optitrack import Motion, read_motion, z_up
 from uwbbench_datasets.measured.recordings import content, mean_frame_rate_hz
 
 BIN_S = 1e-9 / (512 * 1.024)
@@ -72,12 +74,15 @@ class Scans:
         Real RF.
     timestamp_s : (scans,) array
         From the first scan, by the radar's millisecond clock.
+    clock_s : float
+        That clock at the first scan; it runs on from recording to recording until the radar is switched off.
     start_s, sample_interval_s : float
         Delay of bin 0 as the device counts it, and spacing of the bins.
     """
 
     samples: NDArray[np.float32]
     timestamp_s: FloatArray
+    clock_s: float
     start_s: float
     sample_interval_s: float
 
@@ -130,6 +135,7 @@ def read_scans(path: Path) -> Scans:
     return Scans(
         samples=samples.astype(np.float32),
         timestamp_s=(milliseconds - milliseconds[0]) / 1000,
+        clock_s=int(milliseconds[0]) / 1000,
         start_s=int(configuration["start_ps"]) * 1e-12,
         sample_interval_s=step * BIN_S,
     )
@@ -142,23 +148,41 @@ def _expect(path: Path, fits: BoolArray, rule: str) -> None:
         raise CaptureError(f"{path}: byte {byte}: {rule}")
 
 
-class Pulson440RailParams(Params):
-    """Which recording, and the two constants that were fitted to it."""
+OWN_SCAN = "scan_2105627.txt"
+"""Trial 6, on whose reflectors the range bias was fitted."""
+DEVICE_OFFSET_S = 10e-9
+"""Delay in the device and to its antennas that the start of a scan includes."""
 
-    scan: str = Field("scan_2105627.txt", description="Scan file of the radar (binary, whatever its suffix says).")
+
+class Pulson440RailParams(Params):
+    """Which recording, and the two constants that tie radar, motion and reflectors together."""
+
+    scan: str = Field(OWN_SCAN, description="Scan file of the radar (binary, whatever its suffix says).")
     motion: str = Field("group6_trial_008.csv", description="OptiTrack export of the same run.")
     body: str = Field("radar_group6", description="Rigid body of the radar in the export.")
-    frames: Literal["all", "moving"] = Field("all", description="moving: only radar times 4.0 to 8.4 s.")
-    range_bias_m: float = Field(0.44, description="Subtracted from the device's range; fitted on the reflectors.")
-    time_offset_s: float = Field(9.15, description="Added to radar time to get motion time; fitted on the reflectors.")
+    frames: Literal["all", "moving"] = Field("all", description="moving: from the onset of motion to its end.")
+    reflectors: Literal["both", "left", "right"] = Field("both", description="Which of the two are labelled.")
+    range_bias_m: float | None = Field(
+        None,
+        description="Subtracted from the device's range. null: what the other reflector gives where one is labelled, "
+        "0.43 m, fitted on both, where both are.",
+    )
+    time_offset_s: float | None = Field(
+        None, description="Added to radar time to get motion time; null: from the onset of motion in both."
+    )
 
 
 class Pulson440Rail(Dataset[Pulson440RailParams]):
     """Real PulsON 440 moving on a rail in a cluttered room, two labelled corner reflectors.
 
     **Range.** The device counts a range of ``c (scan_start - 10 ns) / 2`` at bin 0. ``first_tap_delay_s`` is chosen so
-    that ``c delay / 2`` is that range minus ``range_bias_m``. Bias and time offset are fitted on the very reflectors
-    that are the truth: spread and detection are independent of them, absolute range is not.
+    that ``c delay / 2`` is that range minus ``range_bias_m``. The bias is known from the reflectors alone: the device's
+    own count, which fits the walk and the tree, is off by 0.4 m on this rail. Where one reflector is labelled, the bias
+    is what the *other* one gives, and range errors mean something; where both are, spread and detection do, and
+    absolute range does not. For other trials of the same day it is a bias from another recording.
+
+    **Time.** Radar and motion capture have no common clock. Both see the onset of motion
+    (:mod:`uwbbench_datasets.measured.onset`), to about 0.03 s, which is 1 cm of range. No reflector is looked at.
 
     **Poses.** Position and heading of the rigid body, interpolated to the radar's own timestamps (17.3 ms apart); NaN
     where the body was not tracked. Coordinates are OptiTrack's as (X, -Z, Y), z up, reflectors included. The body's
@@ -168,6 +192,10 @@ class Pulson440Rail(Dataset[Pulson440RailParams]):
     spectrum, smoothed over 100 MHz, is above -10 dB from 3.07 to 4.59 GHz.
 
     **Truth** is not exhaustive: the room is full of unlabelled objects, so precision has no meaning here.
+
+    **Other trials** of the same day come with ``uwbbench fetch pulson440-rail --more trial_3``; ``scan`` and ``motion``
+    then name their files, such as ``trial_3/group6_trial_005.csv``. That the reflectors stand where they do in trial 6
+    is taken for granted there.
     """
 
     card: ClassVar[Card] = Card(
@@ -192,12 +220,21 @@ class Pulson440Rail(Dataset[Pulson440RailParams]):
                 "group6_trial_008.csv",
             ),
         ),
+        more=tuple(
+            DatasetFolder(
+                f"trial_{number}",
+                "https://api.github.com/repos/jjimmykang/bwsi-backprojection/contents/backprojection/pulson440/"
+                f"rail_sar_test/trial_{number}?ref=8f4d772225b1f377e1cac6962ce80fbd6db0c5f6",
+                (".txt", ".csv"),
+            )
+            for number in (1, 3, 4, 5, 7)
+        ),
     )
-    device_offset_s: ClassVar[float] = 10e-9
-    moving_s: ClassVar[tuple[float, float]] = (4.0, 8.4)
+    bias_of_m: ClassVar[dict[str, float]] = {"both": 0.43, "left": 0.40, "right": 0.46}
+    """Range bias by the labelled reflectors: for the left one fitted on the right one, and the other way round."""
     reflectors_y_up_m: ClassVar[dict[str, tuple[float, float, float]]] = {
-        "left reflector": (2.203936, 0.037515, -3.873749),
-        "right reflector": (2.328990, 0.039530, 1.037974),
+        "left": (2.203936, 0.037515, -3.873749),
+        "right": (2.328990, 0.039530, 1.037974),
     }
 
     def names(self) -> list[str]:
@@ -214,17 +251,21 @@ class Pulson440Rail(Dataset[Pulson440RailParams]):
         """
         if name not in self.names():
             raise CaptureError(f"no capture named '{name}'.{nearest(name, self.names())}")
-        path = self.file(self.params.scan)
-        scans = read_scans(path)
+        p = self.params
+        path, motion_path = self.file(p.scan), self.file(p.motion)
+        scans, motion = read_scans(path), read_motion(motion_path, p.body)
+        offset_s, time_note = self._time_offset(path, scans, motion_path, motion)
+        bias_m, range_note = self._range_bias()
         time_s = scans.timestamp_s
-        position_m, yaw_rad = read_motion(self.file(self.params.motion), self.params.body).at(
-            time_s + self.params.time_offset_s
-        )
-        first, last = self.moving_s if self.params.frames == "moving" else (time_s[0], time_s[-1])
-        kept = (time_s >= first) & (time_s <= last)
-        if not kept.any():
-            raise CaptureError(f"{path}: no scan between {first} and {last} s, where the radar moves")
-        bias_s = 2 * self.params.range_bias_m / SPEED_OF_LIGHT_M_S
+        position_m, yaw_rad = motion.at(time_s + offset_s)
+        kept = np.ones(len(time_s), bool)
+        if p.frames == "moving":
+            first, last = span_s(motion.time_s, motion.position_m)
+            kept = (time_s + offset_s >= first) & (time_s + offset_s <= last)
+            if not kept.any():
+                raise CaptureError(
+                    f"{path}: no scan while '{p.body}' moves, from {first:.2f} to {last:.2f} s of {motion_path}"
+                )
         radar = Radar(
             model="TimeDomain PulsON 440",
             center_frequency_hz=CENTER_FREQUENCY_HZ,
@@ -233,11 +274,12 @@ class Pulson440Rail(Dataset[Pulson440RailParams]):
             frame_rate_hz=mean_frame_rate_hz(time_s, path),
             taps=scans.samples.shape[1],
             samples="rf",
-            first_tap_delay_s=scans.start_s - self.device_offset_s - bias_s,
+            first_tap_delay_s=scans.start_s - DEVICE_OFFSET_S - 2 * bias_m / SPEED_OF_LIGHT_M_S,
         )
         reflectors = (
-            Obstacle(label, "corner reflector", z_up(np.array([place_m])))
-            for label, place_m in self.reflectors_y_up_m.items()
+            Obstacle(f"{side} reflector", "corner reflector", z_up(np.array([place_m])))
+            for side, place_m in self.reflectors_y_up_m.items()
+            if p.reflectors in ("both", side)
         )
         return Capture(
             name=name,
@@ -246,7 +288,34 @@ class Pulson440Rail(Dataset[Pulson440RailParams]):
             truth=Truth(tuple(reflectors), exhaustive=False),
             license=self.card.license,
             citation=self.card.citation,
-            description="PulsON 440 on a rail; range bias and time offset are fitted on the reflectors.",
+            description=f"PulsON 440 on a rail; {range_note}; {time_note}.",
             preamble=scans.samples[kept],
             receivers=(radar.receiver,),
         )
+
+    def _range_bias(self) -> tuple[float, str]:
+        """Range bias, and what it was fitted on."""
+        given_m, labelled = self.params.range_bias_m, self.params.reflectors
+        if given_m is not None:
+            return given_m, f"range bias {given_m:g} m as given"
+        bias_m, own = self.bias_of_m[labelled], self.params.scan == OWN_SCAN
+        on = {"both": "both reflectors", "left": "the right reflector", "right": "the left reflector"}[labelled]
+        if not own:
+            return bias_m, f"range bias {bias_m:g} m, fitted on {on} of trial 6, another recording"
+        scored = "FITTED ON THE SCORED OBJECTS" if labelled == "both" else "which is not labelled here"
+        return bias_m, f"range bias {bias_m:g} m fitted on {on}, {scored}"
+
+    def _time_offset(self, path: Path, scans: Scans, motion_path: Path, motion: Motion) -> tuple[float, str]:
+        """What to add to radar time to get motion time, and where it comes from."""
+        given_s = self.params.time_offset_s
+        if given_s is not None:
+            return given_s, f"time offset {given_s:g} s as given"
+        wavelength_m = SPEED_OF_LIGHT_M_S / CENTER_FREQUENCY_HZ
+        seen_s = onset_s(scans.timestamp_s, moved_by_scans_m(scans.timestamp_s, scans.samples, wavelength_m))
+        tracked_s = onset_s(motion.time_s, moved_by_poses_m(motion.time_s, motion.position_m))
+        if seen_s is None or tracked_s is None:
+            raise CaptureError(
+                f"{path if seen_s is None else motion_path}: shows no onset of motion after {REST_S:g} s at rest, to "
+                "tie the clocks of radar and motion together; give 'time_offset_s'"
+            )
+        return tracked_s - seen_s, f"time offset {tracked_s - seen_s:.2f} s from the onset of motion"

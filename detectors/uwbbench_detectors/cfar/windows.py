@@ -176,6 +176,49 @@ def _gather(training: FloatArray, factor: float, cell: float, into: FloatArray, 
 
 
 @compiled
+def _collect(training: FloatArray, factor: float, cell: float, into: FloatArray, count: int) -> int:
+    """Append the training cells that a cell exceeds by the factor; return how many there are now."""
+    for power in training:
+        into[count] = power  # overwritten by the next one, if not exceeded
+        count += factor * power < cell
+    return count
+
+
+@compiled
+def estimate_by_rank_at(
+    cell: int, power: FloatArray, half: int, guard: int, factor: float, places: tuple[int, int], scratch: FloatArray
+) -> float:
+    """Order statistic of the training cells of one cell, as :func:`estimate_by_rank` has it of all.
+
+    Where only crests are tested this is far less work.
+
+    Parameters
+    ----------
+    cell : int
+    power : (cells,) array
+    half, guard : int
+        Training and guard cells on a side.
+    factor : float
+        Of this cell.
+    places : (int, int)
+        Rank among the training cells of one side and of both, from 1.
+    scratch : (cells,) array
+        Overwritten.
+    """
+    edge, last = half + guard, len(power) - half - guard
+    left = power[cell - edge : cell - guard] if cell >= edge else power[:0]
+    right = power[cell + guard + 1 : cell + guard + 1 + half] if cell < last else power[:0]
+    place = places[1] if edge <= cell < last else places[0]
+    height = power[cell]
+    count = _collect(right, factor, height, scratch, _collect(left, factor, height, scratch, 0))
+    if count < place:
+        return np.inf
+    exceeded = scratch[:count]
+    exceeded.sort()
+    return exceeded[place - 1]
+
+
+@compiled
 def is_crest(amplitude: FloatArray, tap: int, reach: int) -> bool:
     """Whether no tap within ``reach`` exceeds this one; of equal ones the first is the crest.
 
@@ -233,7 +276,8 @@ def detect(
     score_db : (n,) array
         Power of the cell over the noise estimate.
     silent : bool
-        Whether some cells hold a signal and their noise estimate is zero; those are not detected.
+        Whether some cells, of order statistics some crests, hold a signal and their noise estimate is zero; those are
+        not detected.
     """
     frames, taps = amplitude.shape
     cells = taps - start
@@ -246,7 +290,12 @@ def detect(
         heights = amplitude[frame]
         for cell in range(cells):
             power[cell] = heights[start + cell] * heights[start + cell]
-        if statistic == OS:
+        if statistic == OS and reach:
+            for cell in range(cells):
+                noise[cell] = np.inf
+                if power[cell] > 0 and is_crest(heights, start + cell, reach):
+                    noise[cell] = estimate_by_rank_at(cell, power, half, guard, factor[cell], places, scratch[0])
+        elif statistic == OS:
             estimate_by_rank(power, half, guard, factor, places, scratch[0], below, noise)
         else:
             estimate_by_mean(power, half, guard, statistic, scratch, noise)

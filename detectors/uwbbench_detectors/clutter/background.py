@@ -57,12 +57,33 @@ class ClutterRemoval(Stage[P]):
         return block.replace(frames=frames.with_preamble(cleaned))
 
 
+LEAST_FRAMES = 16
+"""Of a background whose length is given in seconds: a sixteenth of an echo, 0.6 dB, goes with it at worst."""
+
+
+def frames_within(seconds: float, radar: Radar) -> int:
+    """Frames that a radar takes in some time, at least :data:`LEAST_FRAMES`."""
+    return max(round(seconds * radar.frame_rate_hz), LEAST_FRAMES)
+
+
 class MeanClutterParams(Params):
-    """Frames that the mean is taken over."""
+    """What the mean is taken over."""
 
     window_frames: int | None = Field(
         None, ge=2, description="Frames of the running mean, the current one included; null: all frames so far."
     )
+    window_s: float | None = Field(
+        None,
+        gt=0,
+        description="Seconds of the running mean, so that one window fits radars of any frame rate; at least "
+        f"{LEAST_FRAMES} frames. window_frames, where it is given too, goes before.",
+    )
+
+    def frames_for(self, radar: Radar) -> int | None:
+        """Frames of the window for a radar; None for all so far."""
+        if self.window_frames is not None or self.window_s is None:
+            return self.window_frames
+        return frames_within(self.window_s, radar)
 
 
 class MeanClutter(ClutterRemoval[MeanClutterParams]):
@@ -82,7 +103,7 @@ class MeanClutter(ClutterRemoval[MeanClutterParams]):
         super().open(radar)
         self._count = 0
         self._head = np.zeros(radar.taps, dtype=np.complex128)
-        self._stretch = np.zeros((self.params.window_frames or 0, radar.taps), dtype=np.complex128)
+        self._stretch = np.zeros((self.params.frames_for(radar) or 0, radar.taps), dtype=np.complex128)
         self._tail = np.zeros_like(self._stretch)
 
     def remove(self, samples: ComplexArray, index: IntArray) -> ComplexArray:  # noqa: ARG002
@@ -96,11 +117,23 @@ class ExponentialClutterParams(Params):
     """How fast the background forgets."""
 
     memory: float = Field(0.97, gt=0, lt=1, description="Share of the background that survives a frame; 0.95 to 0.99.")
+    memory_s: float | None = Field(
+        None,
+        gt=0,
+        description="Time constant of the background, so that one value fits radars of any frame rate; at least "
+        f"{LEAST_FRAMES} frames. memory, where it is given too, goes before.",
+    )
     adaptive: bool = Field(
         False, description="Update only taps near the background, so that echoes do not enter it (selective average)."
     )
     gate_sigmas: float = Field(3.0, gt=0, description="Adaptive: a tap is updated within this many deviations.")
     spread_memory: float = Field(0.9, gt=0, lt=1, description="Adaptive: memory of the deviation of each tap.")
+
+    def gain_for(self, radar: Radar) -> float:
+        """Share of a new frame in the background of a radar."""
+        if self.memory_s is None or "memory" in self.model_fields_set:
+            return 1 - self.memory
+        return -math.expm1(-1 / max(self.memory_s * radar.frame_rate_hz, LEAST_FRAMES))
 
 
 class ExponentialClutter(ClutterRemoval[ExponentialClutterParams]):
@@ -121,6 +154,7 @@ class ExponentialClutter(ClutterRemoval[ExponentialClutterParams]):
     def open(self, radar: Radar) -> None:
         """Start without a background."""
         super().open(radar)
+        self._gain = self.params.gain_for(radar)
         self._background = np.zeros(radar.taps, dtype=np.complex128)
         self._variance = np.zeros(radar.taps)
         self._count = 0
@@ -128,7 +162,7 @@ class ExponentialClutter(ClutterRemoval[ExponentialClutterParams]):
     def remove(self, samples: ComplexArray, index: IntArray) -> ComplexArray:  # noqa: ARG002
         """Frames minus the background before them."""
         p = self.params
-        gain = 1 - p.memory
+        gain = self._gain
         operations = float(math.ceil(4 / gain))
         if self._count == 0 and len(samples):
             self._background[:] = samples[0]

@@ -9,9 +9,11 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from uwbbench.api import ComplexArray, ConfigError, FloatArray, IntArray, Params, Radar
-from uwbbench_detectors.clutter.background import ClutterRemoval
+from uwbbench_detectors.clutter.background import LEAST_FRAMES, ClutterRemoval, frames_within
 
 EPSILON = float(np.finfo(np.float64).eps)
+MOST_FRAMES = 64
+"""Of a window whose length is given in seconds."""
 TOLERANCE = 1e-10
 """Largest error of a cleaned sample, over the frame's largest one, that the fast way of decomposing may leave."""
 
@@ -20,6 +22,13 @@ class SvdClutterParams(Params):
     """Window and rank of the clutter."""
 
     window_frames: int = Field(64, ge=2, description="Frames of the window, the current one included.")
+    window_s: float | None = Field(
+        None,
+        gt=0,
+        description="Seconds of the window, so that one fits radars of any frame rate: at least "
+        f"{LEAST_FRAMES} frames, and at most {MOST_FRAMES}, as the time of a frame grows with them. window_frames, "
+        "where it is given too, goes before.",
+    )
     rank: int | None = Field(1, ge=1, description="Dominant shapes removed; null: as many as hold 'energy'.")
     energy: float = Field(0.95, gt=0, lt=1, description="Share of the window's energy to remove where rank is null.")
     maximum_rank: int = Field(3, ge=1, description="Limit of the rank where it is chosen by energy.")
@@ -32,19 +41,30 @@ class SvdClutterParams(Params):
 
     @model_validator(mode="after")
     def _window_exceeds_rank(self) -> Self:
-        if self.largest_rank >= self.window_frames:
+        least = LEAST_FRAMES if self._in_seconds else self.window_frames
+        if self.largest_rank >= least:
             name = "maximum_rank" if self.rank is None else "rank"
             raise ValueError(
-                f"'{name}' is {self.largest_rank}, which removes all of a window of {self.window_frames} frames; "
+                f"'{name}' is {self.largest_rank}, which removes all of a window of {least} frames; "
                 "it must be smaller than 'window_frames'"
             )
         return self
+
+    def frames_for(self, radar: Radar) -> int:
+        """Frames of the window for a radar."""
+        if self.window_s is None or not self._in_seconds:
+            return self.window_frames
+        return min(frames_within(self.window_s, radar), MOST_FRAMES)
+
+    @property
+    def _in_seconds(self) -> bool:
+        return self.window_s is not None and "window_frames" not in self.model_fields_set
 
 
 class SvdClutter(ClutterRemoval[SvdClutterParams]):
     """Frame minus its projection on the dominant shapes of the last frames.
 
-    The window X (frames, taps) holds the last ``window_frames`` frames, the current one included. With
+    The window X (frames, taps) holds the last frames, the current one included. With
     ``X = U S V^H`` a frame loses its part in the span of the first ``rank`` columns of V; unlike a mean this follows
     gain and phase of the clutter from frame to frame (Sabushimike et al., Sensors 16(9):1409, 2016, compare low-rank
     rejection with averages). Frames come out as zero until the window holds one frame more than the rank, or than
@@ -77,7 +97,7 @@ class SvdClutter(ClutterRemoval[SvdClutterParams]):
         from uwbbench_detectors.clutter import gram as clutter_gram
 
         self._products = clutter_gram
-        frames = self.params.window_frames
+        frames = self.params.frames_for(radar)
         self._window = np.zeros((frames, radar.taps), dtype=np.complex128)
         self._turned = np.zeros((radar.taps, frames), dtype=np.complex128)
         self._gram = np.zeros((frames, frames), dtype=np.complex128)

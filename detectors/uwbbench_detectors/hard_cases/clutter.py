@@ -30,7 +30,7 @@ def rank_deficient_window(subject: StagesOnTrial) -> Evidence:
     stage = subject.stage("clutter.svd")
     rng = np.random.default_rng(5)
     shape = rng.normal(size=TAPS) + 1j * rng.normal(size=TAPS)
-    frames = stage.params.window_frames + 20
+    frames = stage.params.frames_for(StagesOnTrial.radar) + 20
     gain = rng.uniform(0.5, 2.0, frames) * np.exp(2j * np.pi * rng.uniform(size=frames))
     left = subject.through(stage, subject.block_of(gain[:, None] * shape)).frames.preamble
     if np.any(left):
@@ -50,7 +50,7 @@ def ill_conditioned_window(subject: StagesOnTrial) -> Evidence:
     """
     worst = 0.0
     rank = subject.stage("clutter.svd").params.largest_rank
-    window = subject.stage("clutter.svd").params.window_frames
+    window = subject.stage("clutter.svd").params.frames_for(StagesOnTrial.radar)
     if window <= rank + 1:
         raise Violation(f"a window of {window} frames cannot hold {rank} shapes of clutter and a target")
     radar = dataclasses.replace(StagesOnTrial.radar, noise_taps=0)
@@ -77,7 +77,7 @@ def mean_after_a_loud_frame(subject: StagesOnTrial) -> Evidence:
     units in the last place of the quiet frames.
     """
     stage = subject.stage("clutter.mean")
-    window = stage.params.window_frames
+    window = stage.params.frames_for(StagesOnTrial.radar)
     if window is None:
         return Evidence("the mean is over all frames so far, and never forgets")
     rng = np.random.default_rng(8)

@@ -121,6 +121,7 @@ print(kernels.total(np.arange(5.0)), compile_counts().fresh - before.fresh, comp
 """
 
 
+@pytest.mark.slow
 def test_a_prepared_read_only_installation_is_used_by_another_user() -> None:
     """As in a container: prepared by root, then run by somebody who can write nowhere."""
     with tempfile.TemporaryDirectory() as name:

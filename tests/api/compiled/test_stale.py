@@ -156,6 +156,7 @@ def test_names_that_change_their_meaning_in_another_module_are_noticed(tmp_path:
     assert answer(tmp_path, hub="from steps import add as second, scale as first") == "11.0 1"
 
 
+@pytest.mark.slow
 def test_another_processor_does_not_load_this_ones_machine_code(source: Path) -> None:
     imported(source).total(VALUES)
     script = (

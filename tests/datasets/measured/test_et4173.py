@@ -17,9 +17,9 @@ DAMAGE = settings(max_examples=40, deadline=None, suppress_health_check=[HealthC
 
 
 def scans(samples=SAMPLES, **changes):
-    record = np.zeros((1, len(samples)), [("scn", object), ("Tstmp", object), ("Nbin", object)])
+    record = np.zeros((1, len(samples)), [(name, object) for name in ("scn", "Tstmp", "Nbin", "Tstrt")])
     for i, row in enumerate(samples):
-        record[0, i] = (row, 1000 + 33 * i, 32)
+        record[0, i] = (row, 1000 + 33 * i, 32, 17499)
     for name, values in changes.items():
         for i, value in values.items():
             record[0, i][name] = value
@@ -47,8 +47,16 @@ def test_samples_times_and_range_offset_come_back(capture):
     assert capture.preamble.dtype == np.float32
     np.testing.assert_array_equal(capture.preamble, SAMPLES)
     np.testing.assert_allclose(capture.trajectory.timestamp_s, np.arange(900) * 0.033)
-    assert capture.radar.first_tap_delay_s * SPEED_OF_LIGHT_M_S / 2 == pytest.approx(1.112)
+    assert capture.radar.first_tap_delay_s == pytest.approx(7.499e-9)
     assert capture.radar.sample_interval_s == pytest.approx(61.035e-12, rel=1e-5)
+    assert "FITTED ON THE SCORED OBJECT" in capture.description
+
+
+def test_another_range_offset_can_be_given(tmp_path):
+    (tmp_path / "101_P1.mat").write_bytes(mat(scn=scans()))
+    capture = walk(tmp_path, range_offset_m=1.112).open("101")
+    assert capture.radar.first_tap_delay_s * SPEED_OF_LIGHT_M_S / 2 == pytest.approx(1.112)
+    assert "bin 0 at 1.112 m as given" in capture.description
 
 
 def test_the_person_passes_the_corners_at_their_frames(capture):
@@ -73,13 +81,14 @@ def test_the_node_sees_the_person_from_its_corner_facing_the_middle(capture):
         (b"", "not a MATLAB file"),
         (b"garbage " * 100, "not a MATLAB file"),
         (mat(other=1), "no variable 'scn'"),
-        (mat(scn=np.arange(4)), r"scn\(1\) has no field scn, Tstmp, Nbin"),
+        (mat(scn=np.arange(4)), r"scn\(1\) has no field scn, Tstmp, Nbin, Tstrt"),
         (mat(scn=scans(SAMPLES[:0])), "'scn' is empty"),
         (mat(scn=scans(SAMPLES[:3], scn={1: np.arange(5)})), r"scn\(2\)\.scn must be one row"),
         (mat(scn=scans(SAMPLES[:3], scn={0: "text"})), r"scn\(1\)\.scn must be one row"),
         (mat(scn=scans(SAMPLES[:3], Tstmp={2: [1, 2]})), r"scn\(3\)\.Tstmp must be one number"),
         (mat(scn=scans(SAMPLES[:3], Nbin={2: 16})), "Nbin.* the same"),
         (mat(scn=scans(SAMPLES[:3], Nbin={0: 0, 1: 0, 2: 0})), "Nbin.*positive"),
+        (mat(scn=scans(SAMPLES[:3], Tstrt={1: 1})), "Tstrt.* the same"),
         (mat(scn=scans(SAMPLES[:1])), "a frame rate needs two"),
         (mat(scn=scans(SAMPLES[:3], Tstmp={1: 0})), "timestamp_s must be finite and not decrease"),
     ],
@@ -98,7 +107,7 @@ def test_a_damaged_file_gives_the_scans_or_a_capture_error(tmp_path, data):
     length = data.draw(st.integers(0, len(whole)))
     path.write_bytes(whole[:length] + data.draw(st.binary(max_size=30)))
     try:
-        samples, _, _ = read_scans(path)
+        samples, *_ = read_scans(path)
     except CaptureError:
         return
     np.testing.assert_array_equal(samples, SAMPLES[:3])

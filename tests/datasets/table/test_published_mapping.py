@@ -58,6 +58,7 @@ def test_the_mapping_reads_responses_poses_and_truth_of_each_run(recordings: Pat
         assert capture.trajectory.position_m[-1, 0] == pytest.approx(2.8, abs=0.1)
 
 
+@pytest.mark.slow
 def test_one_command_gives_both_tables_beside_the_published_figures(recordings: Path, tmp_path: Path) -> None:
     experiment = read_experiment("published-dataset", data_dir=recordings)
     report = Report(run_experiment(experiment, tmp_path / "run", jobs=1))

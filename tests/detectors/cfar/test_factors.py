@@ -82,6 +82,7 @@ def test_on_one_side_greatest_smallest_and_mean_are_the_same():
     assert len({threshold_factor(s, window(6, sides=1), 1e-3, bandwidth_samples=0.5) for s in ("ca", "go", "so")}) == 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("statistic", ["ca", "go", "so", "os"])
 @pytest.mark.parametrize("total", [2, 8, 12, 16])
 def test_factors_for_filtered_noise_are_those_for_independent_cells_where_the_filter_leaves_no_correlation(

@@ -52,6 +52,7 @@ def test_false_alarms_in_white_noise_come_at_the_rate_asked_for(
     assert_rate(alarms(make_radar, make_block, make_stage, run_stage, samples, kind, **params), trials, rate)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("training", [8, 12, 16])
 @pytest.mark.parametrize("kind", KINDS)
 def test_false_alarms_in_filtered_noise_come_at_the_rate_asked_for(
@@ -63,6 +64,7 @@ def test_false_alarms_in_filtered_noise_come_at_the_rate_asked_for(
     assert_rate(alarms(make_radar, make_block, make_stage, run_stage, samples, kind, **params), trials, 1e-3)
 
 
+@pytest.mark.slow
 def test_factors_for_independent_cells_double_the_false_alarms_of_filtered_noise(
     make_radar, make_block, make_stage, run_stage
 ):

@@ -69,6 +69,7 @@ def lattice(seed, count, width=8):
     return points
 
 
+@pytest.mark.slow
 @given(
     seed=st.integers(0, 10**6),
     count=st.integers(0, 150),

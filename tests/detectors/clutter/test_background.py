@@ -220,3 +220,29 @@ def test_extreme_amplitudes_scale_the_result(
         for s in (samples, samples * scale)
     )
     np.testing.assert_allclose(scaled / scale, plain, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("name", "seconds", "frames", "rate_hz"),
+    [
+        ("clutter.mean", {"window_s": 0.5}, {"window_frames": 24}, 48.0),
+        ("clutter.mean", {"window_s": 0.5}, {"window_frames": 16}, 2.0),  # no background of a few frames
+        ("clutter.exponential", {"memory_s": 0.5}, {"memory": np.exp(-1 / 24)}, 48.0),
+        ("clutter.exponential", {"memory_s": 0.5}, {"memory": np.exp(-1 / 16)}, 2.0),
+        ("clutter.svd", {"window_s": 0.5}, {"window_frames": 24}, 48.0),
+        ("clutter.svd", {"window_s": 0.5}, {"window_frames": 16}, 2.0),
+        ("clutter.svd", {"window_s": 0.5}, {"window_frames": 64}, 1000.0),  # the time of a frame grows with it
+        ("clutter.mean", {"window_s": 0.5, "window_frames": 7}, {"window_frames": 7}, 48.0),
+        ("clutter.exponential", {"memory_s": 0.5, "memory": 0.9}, {"memory": 0.9}, 48.0),
+        ("clutter.svd", {"window_s": 0.5, "window_frames": 7}, {"window_frames": 7}, 48.0),
+    ],
+)
+def test_seconds_become_frames_at_the_rate_of_the_radar(
+    name, seconds, frames, rate_hz, make_radar, make_block, make_stage, make_echoes, run_stage
+):
+    radar = make_radar(frame_rate_hz=rate_hz)
+    one, other = (
+        run_stage(make_stage(name, **params), radar, make_block(make_echoes(FRAMES))).frames.preamble
+        for params in (seconds, frames)
+    )
+    np.testing.assert_allclose(one, other, atol=1e-14)

@@ -216,6 +216,7 @@ class BothWays(Pipeline):
         return found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["paper", "paper-filtering", "paper-subsample", "background-mean"])
 def test_all_hard_cases_find_the_same_fused_and_plain(name):
     detector = BothWays(load_detector(name).config)

@@ -289,6 +289,7 @@ def whole_frames(rng, frames, rate):
     return CELLS * (rng.random(frames) < rate)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("expected", [1, 3, 10, 60])
 @pytest.mark.parametrize("alarms", [apart, in_pairs, in_runs, in_noisy_frames, whole_frames])
 def test_interval_of_clustered_trials_covers_the_true_rate_as_often_as_it_says(alarms, expected):

@@ -19,6 +19,7 @@ from uwbbench.measure.latency.settings import LatencyModel
 REF = CaptureRef("approach", {"speed_m_s": 3.0, "seed": seed()}, (), "approach-ch9-metal-1")
 
 
+@pytest.mark.slow
 def test_a_measurement_is_complete_and_consistent() -> None:
     found = measure(REF, read_detector("paper"), LatencyModel(reference="null"))
     assert found.timed == "samples to rows"

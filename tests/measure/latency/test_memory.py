@@ -43,6 +43,7 @@ def test_what_a_stream_keeps_of_each_frame_is_found(approach: Capture) -> None:
     assert found["growth_frames"] == memory.MEASURED_FRAMES
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("patient")
 def test_a_stream_that_keeps_nothing_does_not_grow(approach: Capture) -> None:
     found = memory.growth(load_detector("null"), approach, received(approach, 40))
@@ -50,6 +51,7 @@ def test_a_stream_that_keeps_nothing_does_not_grow(approach: Capture) -> None:
     assert found["memory_growth_bytes"] < 5000
 
 
+@pytest.mark.slow
 def test_a_slow_detector_is_watched_for_fewer_frames(approach: Capture, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(memory, "LIMIT_S", 0.01)
     monkeypatch.setattr(memory, "MEASURED_FRAMES", 10**5)

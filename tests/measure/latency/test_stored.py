@@ -45,6 +45,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> RunFolder:
     return run_experiment(read_experiment(tmp_path / "tiny.yaml"), tmp_path / "run", jobs=1)
 
 
+@pytest.mark.slow
 def test_every_call_of_the_paced_pass_is_stored(folder: RunFolder) -> None:
     (entry,) = [entry for entry in folder.entries() if entry.kind == "latency"]
     times_us = folder.times_us(f"{entry.unit}-paced")

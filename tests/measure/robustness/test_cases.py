@@ -17,6 +17,7 @@ SNR = "{use: score.snr}"
 RANGE = "{use: range}"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", sorted(shipped("detectors")))
 def test_a_shipped_detector_stands_every_case(name):
     found = examine(load_detector(name))
@@ -26,6 +27,7 @@ def test_a_shipped_detector_stands_every_case(name):
     assert found.usual_hits >= {"null": 0.0, "constant": 0.0, "paper-as-printed": 0.7}.get(name, 0.85)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "name", ["greatest of", "smallest of", "all frames so far", "running median", "adaptive average"]
 )

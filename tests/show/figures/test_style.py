@@ -21,6 +21,7 @@ def few():
 HOSTILE = ["$x_1$ and $", r"\frac{1}{2}", "_hidden", "a\nb\x07", "<b>&amp;", "日本\udcff", "%s {0}"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "suffix"), [*((name, "svg") for name in HOSTILE), (" ".join(HOSTILE), "png"), (" ".join(HOSTILE), "pdf")]
 )
@@ -45,6 +46,7 @@ def test_a_label_that_starts_with_an_underscore_is_in_the_legend(look):
     assert [label.strip("\u200b") for label in look(drawn).legend()] == ["_plate"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("suffix", ["png", "svg", "pdf"])
 def test_the_same_picture_is_the_same_file(few, suffix, tmp_path):
     for name in "ab":

@@ -18,6 +18,7 @@ def charts(content: Content) -> list[Spec]:
     return [chart for section in sections if section is not None for chart in section.charts]
 
 
+@pytest.mark.slow
 def test_every_chart_is_a_valid_specification_that_says_simulated(charts: list[Spec]) -> None:
     assert len(charts) == 3
     for chart in charts:

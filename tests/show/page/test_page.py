@@ -72,6 +72,7 @@ def test_range_bins_hold_each_frame_once(content: Content) -> None:
             assert inside == sum(one.frames for one in of if not one.span)
 
 
+@pytest.mark.slow
 def test_every_chart_follows_the_schema_of_vega_lite_and_says_that_it_is_simulated(content: Content) -> None:
     pictures = list(render.pictures(content))
     assert {picture.name.split("-")[0] for picture in pictures} == {

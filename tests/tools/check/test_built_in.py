@@ -21,7 +21,7 @@ SIMULATED = {
     "limits": {"scene": "echo", "snr_db": 20, "frames": 50},
     "simulated": {"scenes": ["plate"], "set": {"trajectory.speed_m_s": 2.0}},
 }
-MEASURED = ("pulson440-rail", "et4173-walk", "dw1000-apartment", "xethru-x4")
+MEASURED = ("pulson440-rail", "pulson440-tree", "et4173-walk", "dw1000-apartment", "xethru-x4")
 
 
 @pytest.fixture(scope="module")

@@ -94,6 +94,7 @@ def test_a_broken_detector_is_caught_by_the_check_that_is_about_it(broken_detect
     assert found in result.found
 
 
+@pytest.mark.slow
 def test_the_same_detector_unbroken_passes_all_but_the_hard_case_that_it_fails(broken_detector):
     found = examine(broken_detector("pass", GOOD))
     assert [one.check.name for one in found.results if not one.passed] == ["hard-rippled-constant-frames"]

@@ -271,6 +271,7 @@ def test_every_check_of_stages_is_broken_once():
     assert {one.name for one in all_checks("stage")} == BROKEN.keys()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("source", [GOOD, FILTER, ROWS])
 def test_the_same_stage_unbroken_passes_all(examine_plugin, source):
     found = examine_plugin("stage", source)

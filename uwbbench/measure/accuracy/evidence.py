@@ -77,6 +77,10 @@ class Evidence:
         blocks = [[metric.partial(block) for parts in cut for block in parts[at]] for at in range(len(series))]
         return cls(units, blocks, Blocks(len(chosen), min(lengths_s) / BLOCKS))
 
+    def values(self, metric: type[Metric]) -> list[float]:
+        """Value of each detector on all scenes together; NaN where there are none."""
+        return [metric.value(merge(metric, parts)) if parts else math.nan for parts in self.units]
+
 
 def interval_of(
     metric: type[Metric], parts: Sequence[FloatArray], value: float, confidence: float, within: Blocks | None = None

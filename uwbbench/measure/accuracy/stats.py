@@ -135,7 +135,7 @@ def estimated(
     """
     evidence = Evidence.of(metric, [outcomes], scenes)
     (parts,) = evidence.units
-    value = metric.value(merge(metric, parts)) if parts else math.nan
+    (value,) = evidence.values(metric)
     found = interval_of(metric, parts, value, confidence)
     inner = found
     if evidence.blocks:
@@ -185,7 +185,7 @@ def paired_difference(
     if len(first) != len(second):
         raise ValueError(f"a paired comparison needs the same captures, not {len(first)} and {len(second)}")
     evidence = Evidence.of(metric, [first, second], scenes)
-    values = [metric.value(merge(metric, parts)) if parts else math.nan for parts in evidence.units]
+    values = evidence.values(metric)
     within = bool(evidence.blocks)
     sides = [left_out(metric, parts, evidence.recordings) for parts in evidence.blocks or evidence.units]
     (left, weight), (other_left, other_weight) = sides
@@ -232,7 +232,7 @@ def paired_board(
             (one, other): paired_difference(metric, series[one], series[other], scenes, confidence=confidence)
             for one, other in pairs
         }
-    values = np.array([metric.value(merge(metric, parts)) for parts in evidence.units])
+    values = np.array(evidence.values(metric))
     sides = [left_out(metric, parts, None) for parts in evidence.units]
     found = board(values, np.stack([left for left, _ in sides]), np.stack([weight for _, weight in sides]))
     n = [samples_behind(metric, outcomes, value) for outcomes, value in zip(series, values.tolist(), strict=True)]
@@ -271,7 +271,7 @@ def drawn(
     units = len(evidence.units[0])
     if units < RANKED_UNITS:
         return np.empty((0, len(series)))
-    values = np.array([metric.value(merge(metric, parts)) for parts in evidence.units])
+    values = np.array(evidence.values(metric))
     left = np.stack([left_out(metric, parts, None)[0] for parts in evidence.units])
     off = (left - values[:, None]) * math.sqrt((left.shape[1] - 1) / left.shape[1])
     rng = np.random.default_rng(seed)

@@ -21,7 +21,8 @@ import numpy as np
 
 from uwbbench.api.arrays import BoolArray, FloatArray
 from uwbbench.api.capture import Capture
-from uwbbench.detect.pipeline import BATCH_FRAMES, Pipeline
+from uwbbench.api.frames import BATCH_FRAMES
+from uwbbench.detect.pipeline import Pipeline
 from uwbbench.detect.stream import Stream
 
 WINDOW_FRAMES = 200

@@ -12,6 +12,7 @@ from uwbbench.api.block import Block
 from uwbbench.api.capture import Capture, CaptureHeader
 from uwbbench.api.detections import Detections
 from uwbbench.api.errors import ConfigError
+from uwbbench.api.frames import BATCH_FRAMES
 from uwbbench.detect.pipeline import Pipeline
 from uwbbench.measure.accuracy.scoring import Region
 from uwbbench.results.ground_truth import true_ranges
@@ -26,7 +27,6 @@ if TYPE_CHECKING:
 COLUMNS, ROWS = 1500, 500
 """Largest image: more than a page prints at 200 dots an inch."""
 FLOOR_DB = -60.0
-BLOCK_FRAMES = 4096
 
 
 def draw_radargram(capture: Capture, detector: Pipeline | None = None) -> Figure:
@@ -50,7 +50,7 @@ def draw_radargram(capture: Capture, detector: Pipeline | None = None) -> Figure
     time_s = capture.trajectory.timestamp_s[shown] - capture.trajectory.timestamp_s[0]
     blocks: Iterable[Block]
     if detector is None:
-        blocks = (Block(frames) for frames in capture.blocks(BLOCK_FRAMES))
+        blocks = (Block(frames) for frames in capture.blocks(BATCH_FRAMES))
     else:
         blocks = detector.signals(capture)
     image_db, zero = levels(blocks, capture.radar, range_m, shown, FLOOR_DB)

@@ -72,7 +72,7 @@ const base = (() => {
     box.append(make("span", "scroll \u2192", { class: "hint", "aria-hidden": "true" }));
     box.firstElementChild.addEventListener("scroll", () => edges(box), { passive: true });
     const watch = new ResizeObserver(() => edges(box));
-    for (const part of [box, box.querySelector("table")]) watch.observe(part);
+    for (const part of [box, box.firstElementChild.firstElementChild]) watch.observe(part);
   }
   function markOf([path, colour]) {
     const names = "http://www.w3.org/2000/svg", drawn = document.createElementNS(names, "svg"), shape = document.createElementNS(names, "path");

@@ -33,6 +33,13 @@
     }
     return Math.max(lines, ...Object.values(part).map((inner) => legendLines(inner, columns)));
   }
+  // Titles below a chart are broken into lines as its head is.
+  function breakTitles(layers, letters) {
+    for (const { layer, encoding } of layers) {
+      if (layer) breakTitles(layer, letters);
+      if (encoding?.x?.title?.length > letters) encoding.x.title = wrapped(encoding.x.title, letters);
+    }
+  }
   async function draw(place, spec, why) {
     views.get(place)?.finalize();
     views.delete(place);
@@ -47,6 +54,7 @@
     }
     fitted.title.text = wrapped(head.text, letters);
     fitted.title.subtitle = wrapped(head.subtitle ?? "", letters * 1.12);
+    breakTitles(fitted.layer, letters);
     const named = spec.layer.some((layer) => layer.encoding?.y?.type === "nominal");
     const columns = Math.max(1, Math.floor((place.clientWidth - (named ? 200 : 50)) / 150)), lines = fitted.title.text.length + fitted.title.subtitle.length - 2;
     fitted.height = spec.height + 15 * lines + 18 * Math.max(0, legendLines(fitted, columns) - 1);

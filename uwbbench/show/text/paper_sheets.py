@@ -29,7 +29,7 @@ def published_sheets(report: Report) -> Iterator[Sheet]:
     rows = []
     for table, channel, material in published.FIGURES:
         texts = [text for name, by in shown_here for text in _difference(cells[table, channel, material, name], by)]
-        rows.append((TABLES[table], str(channel), material, *texts))
+        rows.append((table, str(channel), material, *texts))
     first = next(iter(cells.values()))
     sources = sorted({row["source"].upper() for row in cells.values() if row["source"]})
     datasets = sorted({shown(row["dataset"]) for row in cells.values() if row["dataset"]})

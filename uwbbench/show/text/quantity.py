@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from uwbbench.api.metric import Metric
+from uwbbench.api.text import counted
 from uwbbench.measure.accuracy.stats import Estimate
 from uwbbench.show.text.numbers import interval, number
 
@@ -75,8 +76,8 @@ class Quantity:
 
 def _scenes(estimate: Estimate) -> str:
     """How many scenes are behind an estimate, and what its interval says."""
-    counted = "1 scene" if estimate.groups == 1 else f"{estimate.groups} scenes"
-    return f"{counted}; interval within these recordings only" if estimate.within else counted
+    scenes = counted(estimate.groups, "scene")
+    return f"{scenes}; interval within these recordings only" if estimate.within else scenes
 
 
 def undefined_titles(metrics: Mapping[str, type[Metric]]) -> str:

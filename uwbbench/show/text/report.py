@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from uwbbench.api.text import one_line
+from uwbbench.api.text import counted, one_line
 from uwbbench.measure.accuracy.intervals import INNER_UNITS, failing_share
 from uwbbench.measure.accuracy.metrics.choice import MetricChoice
 from uwbbench.results.report import Report
@@ -57,8 +57,10 @@ class Tables:
         return self._labelled(published_sheets(self._report))
 
     def leaderboards(self) -> Iterator[Sheet]:
-        """One for each dataset, scoring and table."""
-        return self._labelled(_leaderboards(self._report))
+        """One for each dataset, scoring and table; test signals have tables of their own, and no leader."""
+        signals = self._report.limits.datasets
+        rows = [row for row in self._report.estimates if row[0]["dataset"] not in signals]
+        return self._labelled(_leaderboards(self._report, rows))
 
     def causes(self) -> Iterator[Sheet]:
         """What each cause of errors costs, on one board of each dataset."""
@@ -142,11 +144,11 @@ def write_report(report: Report) -> Path:
     return report.folder.write_text("report.md", markdown(report))
 
 
-def _leaderboards(report: Report) -> Iterator[Sheet]:
+def _leaderboards(report: Report, rows_of: Sequence[tuple[dict[str, Any], Any]]) -> Iterator[Sheet]:
     """One sheet for each dataset, source, scoring and table."""
     quantities = Quantity.of_all(report.metrics)
     groups: dict[tuple[str, ...], list[tuple[dict[str, Any], Any]]] = {}
-    for about, estimates in report.estimates:
+    for about, estimates in rows_of:
         key = about["dataset"], about["source"], about["scoring"], about["table"]
         groups.setdefault(key, []).append((about, estimates))
     for (dataset, source, scoring, table), members in groups.items():
@@ -214,7 +216,7 @@ def _leaderboard_notes(
 def _evidence(members: list[tuple[dict[str, Any], Any]], main: Quantity) -> Iterator[str]:
     """What the intervals rest on, and what the scenes do not show."""
     scenes = max(about["scenes"] for about, _ in members)
-    what = "1 scene" if scenes == 1 else f"{scenes} scenes"
+    what = counted(scenes, "scene")
     yield f"{what}: if none of them fails, at most {failing_share(scenes):.0%} of such scenes do (95 % confidence)."
     if any(estimates[main.name].within for _, estimates in members):
         yield f"Intervals: {WITHIN}."

@@ -38,6 +38,7 @@ def assert_equal_to_running_each(sweep, capture):
             assert np.array_equal(found.processed[rows >= 0], expected.frame)
 
 
+@pytest.mark.slow
 @given(data=st.data())
 @settings(max_examples=40, deadline=None)
 def test_every_set_equals_the_detector_with_thresholds_taken_from_the_peaks_themselves(short, data):
