@@ -117,7 +117,7 @@ class Frozen:
         if not mark.fits(capture):
             raise ChangedCapture(
                 f"{self._place}: capture '{name}' of dataset '{dataset}' was changed: its content is "
-                f"{capture.sha256[:12]}, that of the suite {mark.sha256[:12]}. {_NEW_VERSION.format(self.name)}"
+                f"{capture.sha256[:12]}, that of the suite {mark.sha256[:12]}. {_NEW_VERSION}"
             )
 
     def check_names(self, dataset: str, names: Iterable[str], *, all_of_them: bool) -> None:
@@ -142,13 +142,12 @@ class Frozen:
             if name not in known:
                 raise ChangedCapture(
                     f"{self._place}: dataset '{dataset}' has a capture '{name}', which the suite has not. "
-                    f"{_NEW_VERSION.format(self.name)}"
+                    f"{_NEW_VERSION}"
                 )
         missing = [name for name in known if name not in given] if all_of_them else []
         if missing:
             raise ChangedCapture(
-                f"{self._place}: capture '{missing[0]}' of dataset '{dataset}' is no longer there. "
-                f"{_NEW_VERSION.format(self.name)}"
+                f"{self._place}: capture '{missing[0]}' of dataset '{dataset}' is no longer there. {_NEW_VERSION}"
             )
 
     def check_rules(self, labels: Iterable[str], rules: Any) -> None:
@@ -197,7 +196,7 @@ class Frozen:
         write_json(self.path, self.to_dict())
 
 
-_NEW_VERSION = "If that is meant, 'uwbbench freeze {}' makes it another version, whose results are compared anew."
+_NEW_VERSION = "If that is meant, 'uwbbench freeze' makes it another version, whose results are compared anew."
 _OWN_NAME = "An experiment of your own, with 'extends' and a name of its own, may have others."
 
 
