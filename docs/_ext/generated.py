@@ -68,7 +68,10 @@ def _terms() -> Iterator[str]:
     """Every term of the simulator with its parameters."""
     for name in sorted(registry.entries("terms")):
         term = registry.load_plugin("terms", name)
-        yield from (f"## {name}", "", _plain(describe(term)), "", *_table(term), "")
+        yield from (f"## {name}", "", _plain(describe(term)), "")
+        if term.of_robot:
+            yield from ("* part of a [robot](../howto/scenes.md)", "")
+        yield from (*_table(term), "")
 
 
 def _detectors() -> Iterator[str]:

@@ -105,6 +105,11 @@ def test_a_reader_that_leaves_early_is_no_error(tmp_path: Path) -> None:
     listing.stderr.close()
 
 
+def hears_interrupts() -> None:
+    """Undo what a shell does to what it starts in the background, such as these tests."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
 def test_interrupting_gives_130_and_a_short_message(tmp_path: Path) -> None:
     fifo = tmp_path / "slow.yaml"
     os.mkfifo(fifo)  # reading it waits for ever, so that the interrupt finds the command at work
@@ -114,6 +119,7 @@ def test_interrupting_gives_130_and_a_short_message(tmp_path: Path) -> None:
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
+        preexec_fn=hears_interrupts,
     )
     writer = os.open(fifo, os.O_WRONLY)  # returns once the command has opened the other end
     message = ""

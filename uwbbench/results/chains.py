@@ -6,7 +6,7 @@ from collections import defaultdict
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
-from uwbbench.measure.accuracy.counts import mean_count
+from uwbbench.measure.accuracy.counts import reach_of_mean
 from uwbbench.run.folder.folder import RunFolder
 from uwbbench.run.folder.journal import Entry
 
@@ -37,8 +37,8 @@ def chains_of(folder: RunFolder, entries: Iterable[Entry]) -> pd.DataFrame:
     columns = ["detector", "dataset", "step", "count", "captures", "mean", "low", "high"]
     rows = []
     for key, each in counts.items():
-        mean, low, high, *_ = mean_count(each)
-        rows.append((*key, sum(each), len(each), float(mean), float(low), float(high)))
+        mean, reach = sum(each) / len(each), reach_of_mean(each)
+        rows.append((*key, sum(each), len(each), mean, mean - reach, mean + reach))
     experiment = folder.manifest["experiment"]
     detectors = [config["name"] for config in experiment["detectors"]]
     datasets = [used["label"] for used in experiment["datasets"]]

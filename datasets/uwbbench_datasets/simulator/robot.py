@@ -204,7 +204,7 @@ def _file(name: str, folder: Path, place: str) -> Path:
         try:
             return find_config("robots", name)
         except ConfigError as error:
-            raise ConfigError(f"{place}: {error}; a file of your own ends in .yaml") from error
+            raise ConfigError(f"{place}: {error} A file of your own ends in .yaml.") from error
     path = folder / name
     if not path.resolve().is_relative_to(folder.resolve()):
         raise ConfigError(f"{place}: the robot's file '{name}' must lie in the scene's folder")

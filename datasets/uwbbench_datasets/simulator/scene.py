@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import itertools
 import zlib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cache, partial
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -154,7 +155,8 @@ class Scene:
             stream = np.random.SeedSequence(self.model.seed, spawn_key=(run, zlib.crc32(path.encode())))
             drawn[path] = float(np.random.Generator(np.random.SFC64(stream)).uniform(low, high))
         data = with_values(self.source.data, {**drawn, "seed": self.model.seed}, self.source.place(("draw",)))
-        return _scene(self.name, data, self.source, self.folder)
+        robot_named = partial(read_robot, folder=self.folder, place=self.source.place(("robot",)))
+        return _scene(self.name, data, self.source, self.folder, robot_named)
 
     def radar(self, receiver: str) -> Radar:
         """Radar of one receiver."""
@@ -207,18 +209,21 @@ def read_scenes(path: Path, changes: Mapping[str, Any] | None = None) -> list[Sc
     if count > _MOST_VARIANTS:
         raise ConfigError(f"{source.place(('vary',))}: {count} variants are more than {_MOST_VARIANTS}")
     labels = _short_names(list(vary))
+    robot_named = cache(partial(read_robot, folder=path.parent, place=source.place(("robot",))))
     scenes = []
     for values in itertools.product(*vary.values()):
         chosen = dict(zip(vary, values, strict=True))
         variant = with_values(data, chosen, source.place(("vary",))) if chosen else data
         parts = [f"{labels[key]}-{_text(vary[key], value)}" for key, value in chosen.items()]
         whole = "/".join([name, *(["_".join(parts)] if parts else [])])
-        scenes.append(_scene(whole, variant, source, path.parent))
+        scenes.append(_scene(whole, variant, source, path.parent, robot_named))
         scenes[-1].of_run(1)  # so that a path that leads nowhere is found before anything is simulated
     return scenes
 
 
-def _scene(name: str, data: Mapping[str, Any], source: YamlFile, folder: Path) -> Scene:
+def _scene(
+    name: str, data: Mapping[str, Any], source: YamlFile, folder: Path, robot_named: Callable[[str], Robot]
+) -> Scene:
     """One variant, from the values that the file has in it."""
     radar = data.get("radar")
     channel = (radar if isinstance(radar, dict) else {}).get("channel", RadarModel().channel)
@@ -226,7 +231,7 @@ def _scene(name: str, data: Mapping[str, Any], source: YamlFile, folder: Path) -
     model = checked(SceneModel, for_channel(fixed, channel, source), source)
     robot, place = None, source.place(("robot",))
     if model.robot is not None:
-        robot = read_robot(model.robot, folder, place)
+        robot = robot_named(model.robot)
         robot.check_fits(model.radar, place)
         robot.check_used([item.name for item in model.terms], model.radar.channel, place)
         model = model.model_copy(update={"radar": robot.radar(model.radar, source)})

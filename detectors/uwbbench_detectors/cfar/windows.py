@@ -215,7 +215,8 @@ def estimate_by_rank_at(
         return np.inf
     exceeded = scratch[:count]
     exceeded.sort()
-    return exceeded[place - 1]
+    least: float = exceeded[place - 1]
+    return least
 
 
 @compiled

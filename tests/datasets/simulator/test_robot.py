@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 
 from uwbbench.api import Capture, ConfigError, PluginError
+from uwbbench.api.locate import shipped
 from uwbbench_datasets.simulator.engine import simulate
+from uwbbench_datasets.simulator.robot import read_robot
 from uwbbench_datasets.simulator.scene import Scene, read_scenes
 
 ROBOT = """\
@@ -171,3 +173,10 @@ def test_captures_say_which_robot_made_them(scenes) -> None:
         "Robot without a file, seed 3." in simulate(*scenes({"robot": None, "robot_seed": 3})).captures[0].description
     )
     assert "Robot" not in simulate(*scenes({"robot": None})).captures[0].description
+
+
+@pytest.mark.parametrize("name", sorted(shipped("robots")))
+def test_shipped_robots_can_be_read(name: str) -> None:
+    robot = read_robot(name, Path(), "here")
+    assert robot.model.name == name
+    assert set(robot.model.channels) == {5, 9}

@@ -227,6 +227,9 @@ class GramClutter(Stage[Params]):
         def largest_rank(self):
             return self.rank
 
+        def frames_for(self, radar):
+            return self.window_frames
+
     @classmethod
     def params_type(cls):
         return cls.Window

@@ -1,4 +1,4 @@
-"""Mean of a count over captures that repeat one another, and how sure it is."""
+"""Numbers of captures that repeat one another, such as draws of one simulated scene: their mean, and how sure it is."""
 
 from __future__ import annotations
 
@@ -7,29 +7,29 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from uwbbench.measure.accuracy.intervals import Interval, student
+from uwbbench.measure.accuracy.intervals import student
 
 
-def mean_count(counts: Sequence[float]) -> Interval:
-    """Mean of counts with Student's interval, which does not fall below 0.
+def reach_of_mean(values: Sequence[float]) -> float:
+    """Half of Student's interval of a mean: t times its standard error.
+
+    It holds for values that are drawn alike, as runs of one scene are, and says nothing of other scenes.
 
     Parameters
     ----------
-    counts : sequence of float
+    values : sequence of float
         One of each capture.
 
     Returns
     -------
-    Interval
-        Its outer ends, for which a count would need a bound, are NaN, and so are all ends of fewer than two counts.
+    float
+        NaN for fewer than two values.
 
     Examples
     --------
-    >>> tuple(float(part) for part in mean_count([9.0, 11.0]))[:3]
-    (10.0, 0.0, 22.706204736174698)
+    >>> round(reach_of_mean([9.0, 10.0, 11.0]), 3)
+    2.484
     """
-    value, none = np.asarray(np.mean(counts) if len(counts) else math.nan), np.asarray(math.nan)
-    if len(counts) < 2:
-        return Interval(value, none, none, none, none)
-    reach = student(np.asarray(len(counts) - 1.0)) * np.std(counts, ddof=1) / math.sqrt(len(counts))
-    return Interval(value, np.maximum(value - reach, 0.0), value + reach, none, none)
+    if len(values) < 2:
+        return math.nan
+    return float(student(np.asarray(len(values) - 1.0)) * np.std(values, ddof=1) / math.sqrt(len(values)))

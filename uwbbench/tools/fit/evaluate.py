@@ -13,9 +13,9 @@ from uwbbench.api import registry
 from uwbbench.api.errors import ConfigError, nearest
 from uwbbench.api.metric import Outcome
 from uwbbench.detect.pipeline import Pipeline
-from uwbbench.measure.accuracy.counts import mean_count
+from uwbbench.measure.accuracy.counts import reach_of_mean
 from uwbbench.measure.accuracy.scoring import outcomes
-from uwbbench.measure.accuracy.stats import estimated, evaluate
+from uwbbench.measure.accuracy.stats import evaluate
 from uwbbench.tools.fit.config import CHAIN, IN_CLUSTERS, Cell, Target
 from uwbbench.tools.fit.files import Files, open_cell
 
@@ -52,13 +52,9 @@ class Found:
         return [evaluate(metric, [outcome]) for outcome in self.outcomes.get(target.table, [])]
 
     def ends(self, target: Target) -> tuple[float, float]:
-        """Interval of 95 % of the figure, each draw being one piece of evidence; NaN where there is none."""
-        if target.table == CHAIN:
-            _, low, high, *_ = mean_count(self._counts(target))
-            return float(low), float(high)
-        made = self.outcomes.get(target.table, [])
-        estimate = estimated(registry.load_plugin("metrics", target.metric), made, range(len(made)))
-        return estimate.low, estimate.high
+        """Student's interval of 95 % about the figure, over draws, which are drawn alike; NaN where there is none."""
+        value, reach = self.value(target), reach_of_mean(self.per_draw(target))
+        return value - reach, value + reach
 
     def _counts(self, target: Target) -> list[float]:
         return [float(counts.get(target.metric, 0)) for counts in self.counts]
