@@ -20,8 +20,8 @@ from tables import board_of, readme_text
 
 import uwbbench
 from uwbbench.api.locate import shipped
-from uwbbench.run.experiment import read_experiment
 from uwbbench.results import Report
+from uwbbench.run.experiment import read_experiment
 from uwbbench.run.suite import read_frozen
 from uwbbench.show.charts.theme import PRINT
 from uwbbench.show.page import Content
