@@ -64,9 +64,7 @@ _HOME = {
     "score": "uwbbench.measure.accuracy.scoring",
     "fit_scene": "uwbbench.tools.fit.library",
     "Run": "uwbbench.tools.stored_run",
-    **dict.fromkeys(
-        ("compare", "fit_scene", "gate", "leaderboard", "open_dataset", "open_run", "plot", "tune"), _LIBRARY
-    ),
+    **dict.fromkeys(("compare", "gate", "leaderboard", "open_dataset", "open_run", "plot", "tune"), _LIBRARY),
 }
 
 

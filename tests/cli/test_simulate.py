@@ -101,3 +101,13 @@ def test_a_grid_behind_lost_frames_is_refused_in_one_message(uwbbench, tmp_path:
     (tmp_path / "lossy.yaml").write_text(lossy)
     said = uwbbench("simulate", "lossy.yaml", "-o", "lossy.h5", code=2).stderr
     assert "term 'grid' must come before the terms that lose or repeat frames" in said
+
+
+def test_a_robot_is_validated_like_the_other_files(uwbbench, tmp_path: Path) -> None:
+    text = (
+        "schema: 1\nname: rover\nradar: {sample_interval_ns: 1.0016}\nseed: 1\nchannels: {9: {terms: {ringing: {}}}}\n"
+    )
+    (tmp_path / "rover.yaml").write_text(text)
+    assert "robot 'rover' on channels 9, fine" in uwbbench("validate", "rover.yaml").stdout
+    (tmp_path / "rover.yaml").write_text(text.replace("ringing", "grid"))
+    assert "'grid' is no part of a robot" in uwbbench("validate", "rover.yaml", code=2).stderr

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import uwbbench
+from tests.fixtures.chance import seed
 from uwbbench.api import ConfigError, ScoringError
 from uwbbench.config.detector import DetectorConfig
 from uwbbench.detect.results_folder import ResultsFolder
@@ -31,7 +32,7 @@ def mine(tmp_path: Path) -> Path:
     folder = tmp_path / "mine"
     folder.mkdir()
     dataset, detector = (
-        uwbbench.open_dataset("approach", {"speed_m_s": 3.0, "runs": 2}),
+        uwbbench.open_dataset("approach", {"speed_m_s": 3.0, "runs": 2, "seed": seed()}),
         uwbbench.load_detector("cfar-os"),
     )
     for name in CAPTURES:

@@ -10,7 +10,7 @@ import pytest
 from uwbbench.api import PluginError, registry
 from uwbbench.api.locate import shipped
 from uwbbench.api.yaml_file import parse_yaml, read_yaml
-from uwbbench.tools.schema import detector_schema, experiment_schema, scene_schema
+from uwbbench.tools.schema import detector_schema, experiment_schema, robot_schema, scene_schema
 
 STEPS = "schema: 1\nname: x\npipeline:\n  - {use: profile.amplitude}\n"
 EXPERIMENT = "schema: 1\ndetectors: [paper]\ndatasets:\n  - {use: approach}\n"
@@ -186,3 +186,19 @@ def test_a_stage_that_cannot_be_loaded_keeps_its_name_and_its_reason(monkeypatch
     assert "its library is missing" in use["description"]
     assert errors(schema, f"{STEPS}  - {{use: peaks, params: {{anything: 1}}}}\n") == []
     assert errors(schema, f"{STEPS}  - {{use: filter.prominence}}\n")
+
+
+ROBOT = "schema: 1\nname: rover\nradar: {sample_interval_ns: 1.0016}\nseed: 1\nchannels: {9: {terms: {TERM}}}\n"
+
+
+@pytest.mark.parametrize("name", sorted(shipped("robots")))
+def test_shipped_robots_fit(name) -> None:
+    data = as_an_editor_sees_it(read_yaml(shipped("robots")[name]).data)
+    jsonschema.Draft202012Validator(robot_schema()).validate(data)
+
+
+@pytest.mark.parametrize("term", ["grid: {}", "noize: {}", "ringing: {level: 1}", "ringing: {decay_ns: -1}"])
+def test_a_robot_is_made_of_terms_that_belong_to_it(term) -> None:
+    schema = robot_schema()
+    assert errors(schema, ROBOT.replace("TERM", "ringing: {taps: [{delay_ns: 1, level_db: -9}]}, array: {}")) == []
+    assert errors(schema, ROBOT.replace("TERM", term))

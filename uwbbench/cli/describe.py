@@ -219,12 +219,12 @@ def receiver_text(receiver: dict[str, Any]) -> dict[str, str]:
 
 
 def checked_file(path: Path) -> str:
-    """Summary of a detector, experiment, scene, gate, tuning or fit file that passed all checks.
+    """Summary of a detector, experiment, scene, gate, tuning, fit or robot file that passed all checks.
 
     Raises
     ------
     ConfigError, PluginError
-        If it is wrong, or none of the six.
+        If it is wrong, or none of the seven.
     """
     from uwbbench.config.source import open_dataset
     from uwbbench.detect.pipeline import load_detector
@@ -252,12 +252,15 @@ def checked_file(path: Path) -> str:
     if "terms" in keys or "trajectory" in keys:
         captures = open_dataset(registry.default("dataset.scenes"), {"scenes": [str(path.resolve())]}, ()).names()
         return f"scene of {len(captures)} captures, fine"
-    first_keys = ["pipeline", "extends", "detectors", "datasets", "terms", "head", "tuning", "cells"]
+    if "channels" in keys:
+        robot = registry.load_plugin("datasets", registry.default("dataset.scenes")).read_robot(path).model
+        return f"robot '{robot.name}' on channels {', '.join(map(str, robot.channels))}, fine"
+    first_keys = ["pipeline", "extends", "detectors", "datasets", "terms", "head", "tuning", "cells", "channels"]
     near = [nearest(str(key), first_keys) for key in keys if key != "schema"]
     hint = next((text for text in near if text.startswith(" Did")), "")
     kinds = (
         "a detector ('pipeline' or 'extends'), an experiment ('detectors'), a scene ('terms'), a gate ('head'), a "
-        "tuning ('tuning') nor a fit ('cells')"
+        "tuning ('tuning'), a fit ('cells') nor a robot ('channels')"
     )
     raise ConfigError(f"{path}: neither {kinds}.{hint}")
 

@@ -33,6 +33,7 @@ class File(StrEnum):
     GATE = "gate"
     TUNING = "tuning"
     FIT = "fit"
+    ROBOT = "robot"
 
 
 def list_names(
@@ -159,6 +160,7 @@ def schema(
         experiment_schema,
         fit_schema,
         gate_schema,
+        robot_schema,
         scene_schema,
         tuning_schema,
     )
@@ -170,6 +172,7 @@ def schema(
         File.GATE: gate_schema,
         File.TUNING: tuning_schema,
         File.FIT: fit_schema,
+        File.ROBOT: robot_schema,
     }
     document = makers[file]()
     if output is None:

@@ -84,9 +84,9 @@ def beside(table: pd.DataFrame, detector: str, scoring: str, datasets: Sequence[
     Yields
     ------
     dict
-        ``table``, ``channel``, ``material``, ``metric``; ``published``, ``here`` with its interval (``low``, ``high``)
-        and ``difference`` (here minus published) in metres or shares, NaN where the run has no such row; ``dataset``,
-        ``source`` and ``errors`` (detections behind it), empty and 0 there.
+        ``table``, ``channel``, ``material``, ``metric``; ``published``, ``here`` with Student's interval over captures
+        (``low``, ``high``), and ``difference`` (here minus published), in metres or shares, NaN where the run has no
+        such row; ``dataset``, ``source`` and ``errors`` (detections behind it), empty and 0 there.
     """
     mine = table[(table["detector"] == detector) & (table["scoring"] == scoring)]
     order = {label: place for place, label in enumerate(datasets)}
@@ -95,12 +95,11 @@ def beside(table: pd.DataFrame, detector: str, scoring: str, datasets: Sequence[
         rows = sorted(mine[fits].to_dict("records"), key=lambda row: order[row["dataset"]])
         about = {key: rows[0][key] if rows else none for key, none in _NOTHING.items()}
         for metric, value in figures.items():
-            here, low, high = (
-                float(rows[0].get(name, math.nan)) if rows else math.nan
-                for name in (metric, f"{metric}_low", f"{metric}_high")
+            here, reach = (
+                float(rows[0].get(name, math.nan)) if rows else math.nan for name in (metric, f"{metric}_reach")
             )
             cell = {"table": kind, "channel": channel, "material": material, "metric": metric}
-            ends = {"here": here, "low": low, "high": high, "difference": here - value}
+            ends = {"here": here, "low": here - reach, "high": here + reach, "difference": here - value}
             yield {**cell, "published": value, **ends, **about}
 
 

@@ -25,8 +25,9 @@ import numpy as np
 
 from uwbbench.api.errors import StoreError
 from uwbbench.config.detector import from_results, marked
+from uwbbench.measure.accuracy.counts import reach_of_mean
 from uwbbench.measure.accuracy.metrics.choice import MetricChoice
-from uwbbench.measure.accuracy.stats import Estimate
+from uwbbench.measure.accuracy.stats import Estimate, evaluate
 from uwbbench.results import published
 from uwbbench.results.chains import chains_of
 from uwbbench.results.error_causes import ErrorCauses, error_causes
@@ -216,6 +217,7 @@ class Report:
         """The two tables of arXiv 2512.01018, for every detector and scoring: rows channel and material.
 
         ``table`` distinguishes them: ``filtering`` (error of the range) and ``mapping`` (distance to the outline).
+        Besides the estimates each metric of the paper has ``METRIC_reach``, half of Student's interval over captures.
         """
         import pandas as pd
 
@@ -230,8 +232,16 @@ class Report:
             row = {key: getattr(first, key) for key in keys} | {"captures": len(members)}
             row["frames"] = sum(len(one.outcome.group) for one in members)
             row["errors"] = errors_in(one.outcome for one in members)
-            rows.append(row | _columns(estimates_of(self.metrics, members, self.settings)))
+            rows.append(row | _columns(estimates_of(self.metrics, members, self.settings)) | self._reach(members))
         return pd.DataFrame(rows)
+
+    def _reach(self, members: Sequence[Scored]) -> dict[str, float]:
+        """How sure the mean of each of the paper's metrics is over captures that are drawn alike."""
+        known = {name: self.metrics[name] for name in published.METRICS if name in self.metrics}
+        return {
+            f"{name}_reach": reach_of_mean([evaluate(metric, [one.outcome]) for one in members])
+            for name, metric in known.items()
+        }
 
     @cached_property
     def repeats_the_paper(self) -> bool:

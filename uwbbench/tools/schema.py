@@ -71,6 +71,27 @@ def scene_schema() -> Schema:
     return schema
 
 
+def robot_schema() -> Schema:
+    """JSON Schema of a robot's file, with the parameters of the terms that belong to robots.
+
+    Raises
+    ------
+    PluginError
+        If the dataset that reads scenes, or a term, cannot be loaded.
+    """
+    model = registry.load_plugin("datasets", registry.default("dataset.scenes")).robot_model
+    kinds = {name: registry.load_plugin("terms", name) for name in registry.entries("terms")}
+    params = {name: kind.params_type() for name, kind in kinds.items() if kind.of_robot}
+    models = dict.fromkeys([model, *params.values()])
+    places, whole = models_json_schema([(one, "validation") for one in models], by_alias=True)
+    definitions: dict[str, Schema] = whole["$defs"]
+    owned = {name: places[one, "validation"] for name, one in params.items()}
+    for part in definitions.values():
+        if "terms" in part.get("properties", {}):
+            part["properties"]["terms"] |= {"properties": owned, "additionalProperties": False}
+    return {"$schema": DIALECT, **definitions.pop(model.__name__), "$defs": definitions}
+
+
 def _may_differ(key: str, value: Schema) -> bool:
     """Whether a scene may give the key a value for each channel, and that is not said yet."""
     said = any(BY_CHANNEL in one.get("properties", {}) for one in value.get("anyOf", ()))

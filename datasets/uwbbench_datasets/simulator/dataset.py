@@ -12,6 +12,7 @@ from pydantic import Field
 
 from uwbbench.api import Capture, CaptureError, Card, ConfigError, Dataset, Params, find_config, nearest
 from uwbbench_datasets.simulator.engine import Simulation, simulate
+from uwbbench_datasets.simulator.robot import RobotModel, read_robot_file
 from uwbbench_datasets.simulator.scene import Scene, SceneModel, TermUse, read_scenes
 
 
@@ -41,6 +42,8 @@ class Simulated(Dataset[SimulatedParams]):
 
     scene_model: ClassVar = SceneModel  # what scene files and their terms are checked against, for their schema
     term_model: ClassVar = TermUse
+    robot_model: ClassVar = RobotModel
+    read_robot: ClassVar = staticmethod(read_robot_file)
 
     @cached_property
     def _runs(self) -> dict[str, tuple[Scene, int]]:

@@ -181,9 +181,19 @@ def read_robot(name: str, folder: Path, place: str) -> Robot:
     Raises
     ------
     ConfigError, PluginError
-        If there is no such file, it is wrong, or it gives parameters of a term that does not belong to a robot.
+        If there is no such file, or it is wrong.
     """
-    path = _file(name, folder, place)
+    return read_robot_file(_file(name, folder, place))
+
+
+def read_robot_file(path: Path) -> Robot:
+    """Robot of a file.
+
+    Raises
+    ------
+    ConfigError, PluginError
+        If the file is wrong, or gives parameters of a term that does not belong to a robot.
+    """
     source = read_yaml(path)
     model = checked(RobotModel, source.data, source)
     for key in source.data["channels"]:

@@ -44,7 +44,7 @@ def test_a_fit_leaves_calibrated_files_residuals_trials_and_manifest(outcome, tm
     names = {"plate.yaml", "residuals.csv", "trials.parquet", "summary.md", "manifest.json"}
     assert {path.name for path in folder.iterdir()} == names
     text = (folder / "plate.yaml").read_text()
-    assert text.startswith("# Calibrated to figures of a test; not a validation of it.\n")
+    assert text.startswith("# Calibrated to figures of a test; not a validation of them.\n")
     assert "1 of 1 targets are within their tolerance" in text
     (row,) = csv.DictReader((folder / "residuals.csv").open())
     assert float(row["value"]) == outcome.residuals[0].value

@@ -37,8 +37,8 @@ def published_sheets(report: Report) -> Iterator[Sheet]:
     heads = [head for _, by in shown_here for head in (f"{by.axis} published", here, "difference")]
     notes = [
         f"Published: reported by source, {published.NAME}, of its own recordings. Here: {shown(first['detector'])}, "
-        f"{first['scoring']} scoring, on {', '.join(datasets)}. Difference: here minus published, with the interval of "
-        "what is here.",
+        f"{first['scoring']} scoring, on {', '.join(datasets)}. Difference: here minus published, "
+        "with Student's interval over captures, which are taken to be drawn alike.",
     ]
     if "SIMULATED" in sources:
         notes.append("A difference to simulated captures says how model and recordings differ, not who is right.")

@@ -7,7 +7,7 @@ recorded poses, are copied to it. What a search tries and what a fit leaves behi
 from __future__ import annotations
 
 import shutil
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -34,7 +34,9 @@ Changes = dict[str, dict[str, Any]]
 """Changed values by file and path."""
 
 
-def write_changed(files: Files, changes: Changes, folder: Path, header: str = "") -> dict[str, Path]:
+def write_changed(
+    files: Files, changes: Changes, folder: Path, header: Callable[[str], str] = lambda _: ""
+) -> dict[str, Path]:
     """Write files with values changed.
 
     Parameters
@@ -43,8 +45,8 @@ def write_changed(files: Files, changes: Changes, folder: Path, header: str = ""
     changes : Changes
     folder : Path
         Where they are written, under their own names.
-    header : str
-        Comment that each begins with.
+    header : callable
+        Comment that a file begins with, by its name among them.
 
     Returns
     -------
@@ -65,7 +67,7 @@ def write_changed(files: Files, changes: Changes, folder: Path, header: str = ""
             _copy_named(data, path.parent, folder)
             if ROBOT in files:
                 data[ROBOT] = written[ROBOT].name
-        write_text(written[name], header + as_yaml(data))
+        write_text(written[name], header(name) + as_yaml(data))
     return written
 
 

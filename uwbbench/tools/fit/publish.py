@@ -19,7 +19,7 @@ from uwbbench.run.folder.identity import plain
 from uwbbench.tools.fit.config import Fit
 from uwbbench.tools.fit.evaluate import Residual
 from uwbbench.tools.fit.execute import FitOutcome, Progress, check
-from uwbbench.tools.fit.files import write_changed
+from uwbbench.tools.fit.files import ROBOT, write_changed
 from uwbbench.tools.fit.sheets import markdown, wanted
 
 FORMAT, VERSION = "uwbbench-fit", 1
@@ -60,7 +60,7 @@ def write_outcome(outcome: FitOutcome, folder: Path, progress: Progress = lambda
     changes = plan.changes(outcome.best.values)
     files = write_changed(plan.files, changes, folder)
     outcome = dataclasses.replace(outcome, residuals=check(plan, files, progress))
-    write_changed(plan.files, changes, folder, header(outcome))
+    write_changed(plan.files, changes, folder, lambda name: header(outcome, name))
     write_text(folder / "residuals.csv", _csv(outcome))
     write_parquet(folder / "trials.parquet", _trials(outcome), {"fit": plan.name})
     write_text(folder / "summary.md", markdown(outcome))
@@ -68,17 +68,26 @@ def write_outcome(outcome: FitOutcome, folder: Path, progress: Progress = lambda
     return outcome
 
 
-def header(outcome: FitOutcome) -> str:
-    """Comment that calibrated files begin with: what was fitted, to what, and what is left."""
+def header(outcome: FitOutcome, name: str) -> str:
+    """Comment that a calibrated file begins with: what was fitted, to what, and what is left.
+
+    Parameters
+    ----------
+    outcome : FitOutcome
+        With residuals.
+    name : str
+        Of the file among those of the fit: of a scene only the residuals on it are written.
+    """
     plan, draws = outcome.fit, outcome.fit.model.checking
+    mine = {cell.name for cell in plan.cells.values() if name in (cell.scene, ROBOT)}
     judged = [one for one in outcome.residuals if one.target.judged]
     lines = [
-        f"Calibrated to {one_line(plan.model.source)}; not a validation of it.",
+        f"Calibrated to {one_line(plan.model.source)}; not a validation of them.",
         f"Made by 'uwbbench fit-scene', fit '{plan.name}', {len(outcome.trials)} trials; detector "
         f"{', '.join({cell.detector.name: None for cell in plan.cells.values()})}, {plan.model.scoring} scoring.",
         f"On {len(draws.seeds) * draws.runs} draws that the fit did not see, {len(judged) - len(outcome.missed)} of "
         f"{len(judged)} targets are within their tolerance. Left:",
-        *(f"  {line}" for line in _lines(outcome.residuals)),
+        *(f"  {line}" for line in _lines(one for one in outcome.residuals if one.target.cell in mine)),
     ]
     wrapped = (part for line in lines for part in wrap(line, _WIDTH - 2, subsequent_indent="  ", drop_whitespace=True))
     return "".join(f"# {line}\n" for line in wrapped)
