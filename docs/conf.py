@@ -11,7 +11,7 @@ project = "uwbbench"
 author = "the uwbbench contributors"
 release = version = uwbbench.__version__
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "generated"]
-exclude_patterns = ["_build", "pictures"]
+exclude_patterns = ["_build", "pictures", "leaderboard"]
 
 myst_enable_extensions = ["deflist"]
 myst_heading_anchors = 3

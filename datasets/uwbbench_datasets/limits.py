@@ -46,6 +46,7 @@ class LimitsParams(Params):
         ge=-20, le=80, description="Power of the crest of an echo over that of the noise; of a lacking one in 'noise'."
     )
     separation_ns: float | None = Field(None, gt=0, le=15, description="Delay between the two echoes of a pair.")
+    runs: int = Field(1, ge=1, le=1000, description="Captures with draws of their own.")
     frames: int = Field(3000, ge=1, le=1_000_000, description="Frames of the capture.")
     min_range_m: float = Field(0.2, ge=0, description="Nearest echo.")
     max_range_m: float = Field(6.0, gt=0, le=6.3, description="Farthest echo; the taps end at 6.4 m.")
@@ -80,17 +81,18 @@ class Limits(Dataset[LimitsParams]):
     )
 
     def names(self) -> list[str]:
-        """One capture, named after its scene."""
+        """One capture a run, named after its scene; all frames are drawn anew, so that no run repeats another."""
         p = self.params
         parts = [p.scene, f"{p.snr_db:g}db"] + ([] if p.separation_ns is None else [f"{p.separation_ns:g}ns"])
-        return ["-".join(parts)]
+        name = "-".join(parts)
+        return [name] if p.runs == 1 else [f"{name}/{run}" for run in range(1, p.runs + 1)]
 
     def open(self, name: str) -> Capture:
         """Simulate the frames."""
         if name not in self.names():
             raise CaptureError(f"no test signal '{name}'.{nearest(name, self.names())}")
         p = self.params
-        rng = np.random.default_rng(p.seed)
+        rng = np.random.default_rng(p.seed if p.runs == 1 else [p.seed, self.names().index(name)])
         range_m = self._ranges(rng)
         obstacles = tuple(
             Obstacle(f"echo {index + 1}", "ideal", np.stack([one, np.zeros_like(one)], axis=1)[:, None, :])

@@ -124,3 +124,13 @@ def test_subsample_ranges_reach_the_accuracy_of_the_log_parabola(snr_db: float, 
 def test_ranges_on_whole_taps_stay_at_the_error_of_their_grid() -> None:
     error_m = errors_m("paper-filtering", signal(scene="echo", snr_db=30, frames=4000))
     assert 100 * np.sqrt(np.mean(error_m**2)) == pytest.approx(4.42, rel=0.02 + SIGMAS / np.sqrt(2 * len(error_m)))
+
+
+def test_several_runs_of_a_signal_have_draws_of_their_own_and_one_run_keeps_its_name() -> None:
+    def dataset(**params):
+        return open_dataset("limits", {"scene": "echo", "snr_db": 20, "frames": 9, **params}, ())
+
+    several = dataset(runs=3)
+    assert several.names() == ["echo-20db/1", "echo-20db/2", "echo-20db/3"]
+    assert len({several.open(name).sha256 for name in several.names()}) == 3
+    assert dataset().names() == ["echo-20db"]

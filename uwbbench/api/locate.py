@@ -8,7 +8,7 @@ from typing import Literal
 from uwbbench.api import registry
 from uwbbench.api.errors import ConfigError, PluginError, nearest
 
-Folder = Literal["detectors", "experiments", "scenes", "robots", "gates", "tuning", "fits"]
+Folder = Literal["detectors", "experiments", "suites", "scenes", "robots", "gates", "tuning", "fits"]
 
 _PACKAGE = Path(__file__).resolve().parent.parent
 
@@ -34,8 +34,8 @@ def find_config(folder: Folder, name: str, relative_to: Path | None = None) -> P
 
     Parameters
     ----------
-    folder : {"detectors", "experiments", "scenes", "robots", "gates", "tuning", "fits"}
-        Kind of config.
+    folder : {"detectors", "experiments", "suites", "scenes", "robots", "gates", "tuning", "fits"}
+        Kind of config; suites are experiments, and are found among them.
     name : str
         A path (ends in ``.yaml`` or ``.yml``, or holds a separator), a shipped name, or for detectors a name that a
         package registers.
@@ -57,7 +57,7 @@ def find_config(folder: Folder, name: str, relative_to: Path | None = None) -> P
             if path.is_file():
                 return path
         raise ConfigError(f"{tried[0]}: no such file")
-    known = shipped(folder)
+    known = shipped(folder) | (shipped("suites") if folder == "experiments" else {})
     others = registry.entries("detectors") if folder == "detectors" else {}
     if name in known and name in others:
         packages = f"uwbbench and {others[name].package}"

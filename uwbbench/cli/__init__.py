@@ -27,6 +27,7 @@ from uwbbench.cli import (
     scaffold,
     simulate,
     stability,
+    suite,
     time,
     tune,
     warmup,
@@ -100,6 +101,7 @@ for _group in (
     plot,
     warmup,
     leaderboard,
+    suite,
 ):
     _group.register(app)
 

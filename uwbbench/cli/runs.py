@@ -18,6 +18,7 @@ from uwbbench.show.written import Format
 
 if TYPE_CHECKING:
     from uwbbench.run import Progress
+    from uwbbench.run.experiment import Experiment
     from uwbbench.run.folder import RunFolder
 
 RunPath = Annotated[Path, typer.Argument(metavar="RUN", help="Run folder.", show_default=False)]
@@ -36,6 +37,20 @@ def run(
     resume: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Run folder to continue instead.", show_default=False)
     ] = None,
+    detector: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--detector",
+            "-d",
+            metavar="NAME|FILE",
+            help="Detector to run instead of those of the experiment; may be repeated.",
+        ),
+    ] = None,
+    quick: Annotated[bool, typer.Option("--quick", help="The smaller version of it, for a first look.")] = False,
+    seeds: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Draw its captures from these secret seeds: its private half."),
+    ] = None,
     settings: options.Settings = None,
     json: options.Json = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress on the terminal.")] = False,
@@ -43,24 +58,37 @@ def run(
     """Run an experiment: every detector on every capture.
 
     Prints a leaderboard and leaves a run folder. A detector or capture that fails is a row with its reason; the exit
-    code is then 3.
+    code is then 3. A suite, whose captures are frozen, stops at a capture that was changed.
     """
+    from uwbbench.api.locate import is_path
     from uwbbench.api.override import parse_settings
     from uwbbench.run import Interrupted, run_experiment
     from uwbbench.run.experiment import read_experiment
 
     if out is not None and resume is not None:
         raise ConfigError("--out makes a new run folder and --resume continues one; give one of them")
-    plan = read_experiment(experiment, parse_settings(settings or ()), data_dir)
+    changes = parse_settings(settings or ())
+    if detector:
+        changes["detectors"] = [str(Path(name).resolve()) if is_path(name) else name for name in detector]
+    plan = read_experiment(experiment, changes, data_dir, quick=quick, seeds=seeds)
+    _say_left_out(plan)
     try:
         with _progress_bar(quiet) as advance:
             folder = run_experiment(plan, resume or out, jobs=jobs, resume=resume is not None, progress=advance)
     except Interrupted as stop:
         typer.echo(str(stop), err=True)
         raise typer.Exit(INTERRUPTED) from stop
+    for label, reason in folder.manifest["skipped"].items():
+        typer.echo(f"skipped: {label} (optional): {reason}", err=True)
     _conclude(folder, data_dir, json=json)
     if any(entry.status == "failed" for entry in folder.entries()):
         raise typer.Exit(UNITS_FAILED)
+
+
+def _say_left_out(plan: Experiment) -> None:
+    """Say which datasets a private half lacks."""
+    for label in plan.left_out:
+        typer.echo(f"left out: {label}, which cannot be drawn from seeds", err=True)
 
 
 @contextmanager

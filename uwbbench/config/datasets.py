@@ -66,6 +66,14 @@ class DatasetSource:
     repeats : str, tuple of tuples of str, or None
         Part of names by which repeats of a scene differ, or lists of captures that repeat one another; None where the
         dataset says it.
+    at_most : int or None
+        Captures to take, spread evenly over those that are chosen; None for all.
+    optional : bool
+        Whether it may be left out where its files are not there.
+    timed : bool
+        Whether detectors are timed on it.
+    secret : dict
+        Parameters that are put over the written ones when a capture is opened, and are stored nowhere.
     region : RegionModel or None
         Where its captures are scored; None for the region of all.
     """
@@ -76,12 +84,19 @@ class DatasetSource:
     captures: tuple[str, ...] | None = None
     roots: tuple[str, ...] = ()
     repeats: str | tuple[tuple[str, ...], ...] | None = None
+    at_most: int | None = None
+    optional: bool = False
+    timed: bool = True
+    secret: dict[str, Any] = field(default_factory=dict, repr=False)
     region: RegionModel | None = None
 
     def to_dict(self) -> dict[str, Any]:
-        """As plain values, without the folders of this machine."""
+        """As plain values, without the folders of this machine and without what is secret."""
         about: dict[str, Any] = {"label": self.label, "use": self.use, "params": self.params, "captures": self.captures}
         about |= {} if self.repeats is None else {"repeats": self.repeats}
+        about |= {} if self.at_most is None else {"at_most": self.at_most}
+        about |= {"optional": True} if self.optional else {}
+        about |= {} if self.timed else {"latency": False}
         return about if self.region is None else {**about, "region": self.region.model_dump()}
 
     def scenes(self, names: Sequence[str]) -> dict[str, str]:
@@ -126,7 +141,9 @@ class DatasetSource:
             if not any(_fits(name, (pattern,)) for name in names):
                 raise CaptureError(f"dataset '{self.label}' has no capture '{pattern}'.{nearest(pattern, names)}")
         chosen = [name for name in names if self.captures is None or _fits(name, self.captures)]
-        return [CaptureRef(self.use, self.params, self.roots, name) for name in chosen]
+        if self.at_most is not None and self.at_most < len(chosen):
+            chosen = [chosen[place * len(chosen) // self.at_most] for place in range(self.at_most)]
+        return [CaptureRef(self.use, self.params, self.roots, name, self.secret) for name in chosen]
 
 
 def _fits(name: str, patterns: tuple[str, ...]) -> bool:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -87,12 +87,15 @@ class CaptureRef:
         Folders to search.
     name : str
         Name of the capture in the dataset.
+    secret : dict
+        Parameters that are put over the written ones when the capture is opened, and are stored nowhere.
     """
 
     dataset: str
     params: dict[str, Any]
     roots: tuple[str, ...]
     name: str
+    secret: dict[str, Any] = field(default_factory=dict, repr=False)
 
     def open(self) -> Capture:
         """Open the capture.
@@ -102,7 +105,8 @@ class CaptureRef:
         CaptureError
             If its files are missing or broken.
         """
-        return open_dataset(self.dataset, self.params, [Path(root) for root in self.roots]).open(self.name)
+        params = {**self.params, **self.secret}
+        return open_dataset(self.dataset, params, [Path(root) for root in self.roots]).open(self.name)
 
     @classmethod
     def of_file(cls, path: Path, receiver: str | None = None) -> CaptureRef:

@@ -20,6 +20,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections import defaultdict
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
@@ -90,48 +91,54 @@ def cramer_rao_range_m(snr_db: float) -> float:
 
 @dataclass(frozen=True)
 class Trial:
-    """One detector on one test signal.
+    """One detector on all captures of one test signal.
 
     Attributes
     ----------
     detector, scene : str
     snr_db : float
     separation_ns : float or None
-    header : CaptureHeader
-    found : Detections
+    captures : tuple of (CaptureHeader, Detections)
     """
 
     detector: str
     scene: str
     snr_db: float
     separation_ns: float | None
-    header: CaptureHeader
-    found: Detections
+    captures: tuple[tuple[CaptureHeader, Detections], ...]
 
     @cached_property
     def range_m(self) -> FloatArray:
         """True range (frames, echoes)."""
-        truth = self.header.truth
-        objects = truth.objects if truth is not None else ()
-        columns = [np.linalg.norm(obstacle.outline_m[:, 0], axis=-1) for obstacle in objects]
-        return np.stack(columns, axis=1) if columns else np.empty((len(self.header), 0))
+        return np.concatenate([_true_range_m(header) for header, _ in self.captures])
 
     @cached_property
     def error_m(self) -> FloatArray:
         """Error (frames, echoes) of the nearest detection; NaN where the frame has none."""
-        frame, range_m = self.found.frame, self.found.range_m
-        error_m = np.full(self.range_m.shape, np.nan)
-        for echo in range(self.range_m.shape[1]):
-            off_m = range_m - self.range_m[frame, echo]
-            order = np.argsort(-np.abs(off_m), kind="stable")  # the nearest is written last
-            error_m[frame[order], echo] = off_m[order]
-        return error_m
+        return np.concatenate([_nearest_error_m(found, _true_range_m(header)) for header, found in self.captures])
 
     def proportion(self, hits: BoolArray, among: BoolArray) -> dict[str, Any]:
         """Share of the frames ``among`` that are ``hits``, with its interval."""
         count, frames = int(np.sum(hits & among)), int(np.sum(among))
         low, high = clopper_pearson(count, frames)
         return {"share": count / frames if frames else math.nan, "low": low, "high": high, "n": frames}
+
+
+def _true_range_m(header: CaptureHeader) -> FloatArray:
+    """True range (frames, echoes)."""
+    objects = header.truth.objects if header.truth is not None else ()
+    columns = [np.linalg.norm(obstacle.outline_m[:, 0], axis=-1) for obstacle in objects]
+    return np.stack(columns, axis=1) if columns else np.empty((len(header), 0))
+
+
+def _nearest_error_m(found: Detections, true_m: FloatArray) -> FloatArray:
+    """Error (frames, echoes) of the detection nearest to each echo; NaN where the frame has none."""
+    error_m = np.full(true_m.shape, np.nan)
+    for echo in range(true_m.shape[1]):
+        off_m = found.range_m - true_m[found.frame, echo]
+        order = np.argsort(-np.abs(off_m), kind="stable")  # the nearest is written last
+        error_m[found.frame[order], echo] = off_m[order]
+    return error_m
 
 
 class Limits:
@@ -165,18 +172,21 @@ class Limits:
         entries = [
             e for e in self.folder.entries() if (e.kind, e.status) == ("accuracy", "done") and e.dataset in params
         ]
-        detectors, labels = list(self._configs), list(params)
-        entries.sort(key=lambda entry: (detectors.index(entry.detector), labels.index(entry.dataset)))
+        captures: dict[tuple[str, str], list[tuple[CaptureHeader, Detections]]] = defaultdict(list)
+        for entry in entries:
+            read = self.folder.header(entry.capture_id), self.folder.detections(entry.unit)
+            captures[entry.detector, entry.dataset].append(read)
         return [
             Trial(
-                detector=entry.detector,
-                scene=params[entry.dataset]["scene"],
-                snr_db=float(params[entry.dataset]["snr_db"]),
-                separation_ns=params[entry.dataset].get("separation_ns"),
-                header=self.folder.header(entry.capture_id),
-                found=self.folder.detections(entry.unit),
+                detector=detector,
+                scene=signal["scene"],
+                snr_db=float(signal["snr_db"]),
+                separation_ns=signal.get("separation_ns"),
+                captures=tuple(captures[detector, label]),
             )
-            for entry in entries
+            for detector in self._configs
+            for label, signal in params.items()
+            if (detector, label) in captures
         ]
 
     @cached_property
@@ -217,12 +227,11 @@ class Limits:
         return any(step["params"].get("cells") == "all" for step in self._configs[detector]["pipeline"])
 
     def _false_alarms(self, trial: Trial) -> Iterator[dict[str, Any]]:
-        radar = trial.header.radar
+        radar = trial.captures[0][0].radar
         cell_m = SPEED_OF_LIGHT_M_S * radar.sample_interval_s / 2
         cells = int(np.sum(_clear(cell_m * np.arange(radar.taps, dtype=np.float64))))
-        frames = len(trial.found.processed)
-        row = np.searchsorted(trial.found.processed, trial.found.frame[_clear(trial.found.range_m)])
-        alarms = np.bincount(row, minlength=frames)
+        alarms = np.concatenate([_alarms(found) for _, found in trial.captures])
+        frames = len(alarms)
         low, high = clustered_proportion(alarms, cells)
         total, n = int(alarms.sum()), frames * cells
         rate = {"share": total / n if n else math.nan, "low": low, "high": high, "n": n}
@@ -249,6 +258,12 @@ class Limits:
 
 def _clear(range_m: FloatArray) -> BoolArray:
     return np.asarray((range_m >= CLEAR_M[0]) & (range_m <= CLEAR_M[1]))
+
+
+def _alarms(found: Detections) -> IntArray:
+    """Detections (processed frames,) in the clear span of each frame."""
+    row = np.searchsorted(found.processed, found.frame[_clear(found.range_m)])
+    return np.bincount(row, minlength=len(found.processed)).astype(np.int64)
 
 
 def _accuracy(trial: Trial) -> Iterator[dict[str, Any]]:

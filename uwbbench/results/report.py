@@ -246,11 +246,8 @@ class Report:
     @cached_property
     def repeats_the_paper(self) -> bool:
         """Whether the run covers every row of the paper's tables, counted as there."""
-        table = self.paper_tables
-        if table.empty:
-            return False
-        alike = table[table["scoring"] == published.SCORING]
-        return set(zip(alike["channel"], alike["material"], strict=True)) >= set(published.ROWS)
+        alike = (one for one in self.scored if one.scoring == published.SCORING)
+        return {(one.channel, one.material) for one in alike} >= set(published.ROWS)
 
     @cached_property
     def published(self) -> list[dict[str, Any]]:

@@ -5,8 +5,8 @@ Conventions
 * A frame belongs to the range bin of its nearest visible obstacle; frames with nothing in view are in no bin, and only
   in the row of all ranges.
 * Bins have one width in a run, so that datasets can be read side by side.
-* Channels and materials are those of whole captures. Cuts by channel, material and range at once have no intervals:
-  there are many of them, and few frames in each.
+* Channels and materials are those of whole captures. Cuts by more than one of channel, material and range have no
+  intervals: there are many of them, and few frames in each.
 """
 
 from __future__ import annotations
@@ -124,13 +124,13 @@ def slices(
                     groups[one.detector, span].append((outcome, scene[one.capture]))
             for (detector, span), held in groups.items():
                 outcomes, scenes = [outcome for outcome, _ in held], [name for _, name in held]
-                threefold = ALL not in (channel, material, span)
+                several = (channel, material, span).count(ALL) < 2
                 if (channel, material, span) == (ALL, ALL, ALL):
                     estimates = known[board, detector]
                 else:
                     estimates = {
                         name: _bare(metric, outcomes, scenes)
-                        if threefold
+                        if several
                         else estimated(metric, outcomes, scenes, confidence=settings["confidence"])
                         for name, metric in metrics.items()
                     }

@@ -21,6 +21,7 @@ from joblib import Parallel, delayed
 from uwbbench.api.errors import StoreError, UwbbenchError
 from uwbbench.api.interruption import by_plugin, listening
 from uwbbench.config.detector import DetectorConfig, detector_identity, read_detector
+from uwbbench.config.seeds import HIDDEN
 from uwbbench.detect.pipeline import Pipeline
 from uwbbench.detect.results_folder import ResultsFolder
 from uwbbench.measure.accuracy.scoring import ScoringRules
@@ -127,6 +128,8 @@ def _created(experiment: Experiment, todo: Plan, out: Path | None, jobs: int) ->
         "experiment": experiment.to_dict(),
         **_code(experiment, todo),
         "scenes": todo.scenes,
+        "skipped": todo.skipped,
+        **({} if experiment.frozen is None else {"frozen": experiment.frozen.contents()}),
         "sessions": [environment.session(jobs)],
     }
     return RunFolder.create(out, manifest)
@@ -156,6 +159,10 @@ def _resumed(experiment: Experiment, todo: Plan, out: Path | None, jobs: int) ->
         raise StoreError("resuming needs the run folder to continue")
     folder = RunFolder(out)
     before, now = folder.manifest["experiment"], plain(experiment.to_dict())
+    seeds = [one.get("suite", {}).get("seeds", "") for one in (before, now)]
+    if seeds[0] != seeds[1]:
+        said = [f"seeds {one[:12]}" if one else "no secret seeds" for one in seeds]
+        raise StoreError(f"{out}: was run with {said[0]}, not with {said[1]}; resume it with the same --seeds")
     if canonical(before) != canonical(now):
         keys = [key for key in now if canonical(now[key]) != canonical(before.get(key))]
         raise StoreError(
@@ -165,6 +172,7 @@ def _resumed(experiment: Experiment, todo: Plan, out: Path | None, jobs: int) ->
     folder.update_manifest(
         **_code(experiment, todo),
         scenes={**folder.manifest.get("scenes", {}), **todo.scenes},
+        skipped=todo.skipped,
         sessions=[*folder.manifest["sessions"], environment.session(jobs)],
     )
     return folder
@@ -191,7 +199,7 @@ class _Run:
         before = {entry.unit: entry for entry in self.folder.entries()}
         broken = {entry.unit for entry in self.plan.failures}
         for entry in self.plan.failures:
-            self.folder.record(entry)
+            self.folder.record(self._without_seeds(entry))
         for entry in before.values():  # a dataset that is there again
             if entry.kind == "listing" and entry.unit not in broken:
                 self.folder.record(dataclasses.replace(entry, status="done", reason=""))
@@ -267,7 +275,9 @@ class _Run:
         return [unit for unit in self.plan.units if unit.id not in same]
 
     def _job(self, unit: Unit) -> Job:
-        return Job(unit, self._rules(unit.dataset), self.session, os.getpid())
+        frozen = self.experiment.frozen
+        mark = None if frozen is None else frozen.only(unit.dataset, unit.ref.name)
+        return Job(unit, self._rules(unit.dataset), self.session, os.getpid(), mark)
 
     def _rules(self, dataset: str) -> tuple[ScoringRules, ...]:
         """Rules of the captures of one dataset."""
@@ -313,7 +323,16 @@ class _Run:
             self.folder.write_times(entry.unit, finished.times_us, entry.facts.get(REPORTED_FACT, {}))
         self._journal(entry)
 
+    def _without_seeds(self, entry: Entry) -> Entry:
+        """The entry with nothing secret in what a plugin says of its failure."""
+        for dataset in self.experiment.datasets:
+            for value in dataset.secret.values():
+                texts = {name: getattr(entry, name).replace(str(value), HIDDEN) for name in ("reason", "traceback")}
+                entry = dataclasses.replace(entry, **texts)
+        return entry
+
     def _journal(self, entry: Entry) -> None:
+        entry = self._without_seeds(entry)
         self.folder.record(entry)
         self.done += 1
         if self.progress is not None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -21,8 +21,11 @@ from uwbbench.config.extends import extended, placed
 from uwbbench.config.given import Given, read_given
 from uwbbench.config.model import ConfigModel, DetectorName
 from uwbbench.config.rules import GateRadius, IntervalModel, MetricsUse, RegionModel, Scoring, Strongest, Surface
+from uwbbench.config.seeds import Seeds, read_seeds
 from uwbbench.config.source import data_roots
 from uwbbench.measure.latency.settings import LatencyModel
+from uwbbench.run.folder.scored import rules_of
+from uwbbench.run.suite import WHOLE, Frozen, SuitePart, read_frozen
 
 
 class DetectorUse(ConfigModel):
@@ -59,11 +62,21 @@ DetectorItem = Annotated[
 
 
 class ScoredDataset(DatasetUse):
-    """Captures of one dataset, and where they are scored."""
+    """Captures of one dataset, where they are scored, and whether they are timed."""
 
     region: RegionModel | None = Field(
         default=None, description="Score region of these captures alone; that of the experiment if left out."
     )
+    optional: bool = Field(default=False, description="Skip it, with a note, where its files are not there.")
+    latency: bool = Field(default=True, description="Time detectors on it, where the experiment times them at all.")
+
+
+class QuickModel(ConfigModel):
+    """What ``--quick`` makes of an experiment."""
+
+    captures: int = Field(default=2, ge=1, description="Captures of each dataset at most, spread evenly.")
+    latency: bool = Field(default=False, description="Whether detectors are timed.")
+    stability: bool = Field(default=False, description="Whether the hard cases are put to them.")
 
 
 class ExperimentModel(ConfigModel):
@@ -96,6 +109,7 @@ class ExperimentModel(ConfigModel):
     stability: bool = Field(default=True, description="Put the hard cases to each detector; see 'uwbbench stability'.")
     seed: int = Field(default=0, ge=0, description="Of what reports draw: the probability of being on a front.")
     intervals: IntervalModel = Field(default_factory=IntervalModel)
+    quick: QuickModel | None = Field(default=None, description="A smaller version of it, for 'run --quick'.")
 
     @field_validator("scoring", mode="before")
     @classmethod
@@ -134,6 +148,12 @@ class Experiment:
     stability : bool
     seed : int
     intervals : IntervalModel
+    part : SuitePart
+        Which part of a suite it is.
+    frozen : Frozen or None
+        What its captures are held against; None where it is no suite.
+    left_out : tuple of str
+        Datasets that cannot be drawn anew, where seeds are secret.
     """
 
     name: str
@@ -150,6 +170,9 @@ class Experiment:
     stability: bool
     seed: int
     intervals: IntervalModel
+    part: SuitePart = WHOLE
+    frozen: Frozen | None = field(default=None, repr=False)
+    left_out: tuple[str, ...] = ()
 
     @property
     def runnable(self) -> tuple[DetectorConfig, ...]:
@@ -175,10 +198,19 @@ class Experiment:
             "stability": self.stability,
             "seed": self.seed,
             "intervals": self.intervals.model_dump(),
+            **({} if self.part == WHOLE else {"suite": self.part.to_dict()}),
         }
 
 
-def read_experiment(name: Given, changes: Mapping[str, Any] | None = None, data_dir: Path | None = None) -> Experiment:
+def read_experiment(
+    name: Given,
+    changes: Mapping[str, Any] | None = None,
+    data_dir: Path | None = None,
+    *,
+    quick: bool = False,
+    seeds: Path | None = None,
+    frozen: bool = True,
+) -> Experiment:
     """Read an experiment by name or path, with every detector and dataset in it checked.
 
     Parameters
@@ -189,6 +221,12 @@ def read_experiment(name: Given, changes: Mapping[str, Any] | None = None, data_
         Values to change, by path, before checking: ``{"gate_m": 0.1}``.
     data_dir : Path, optional
         First folder in which datasets are searched.
+    quick : bool
+        Its smaller version.
+    seeds : Path, optional
+        Seed file: captures are drawn from secret seeds, and datasets that cannot be are left out.
+    frozen : bool
+        Hold it against the lock file beside it, where there is one.
 
     Returns
     -------
@@ -210,7 +248,7 @@ def read_experiment(name: Given, changes: Mapping[str, Any] | None = None, data_
     if model.latency.enabled and model.latency.reference is not None:
         with placed(source, ("latency", "reference")):
             read_detector(model.latency.reference, path.parent)
-    return Experiment(
+    experiment = Experiment(
         name=model.name or path.stem,
         description=model.description,
         detectors=_detectors(model, source, path.parent),
@@ -226,11 +264,52 @@ def read_experiment(name: Given, changes: Mapping[str, Any] | None = None, data_
         seed=model.seed,
         intervals=model.intervals,
     )
+    experiment = _frozen(experiment, read_frozen(path) if frozen else None)
+    if quick:
+        experiment = _quick(experiment, model.quick, source)
+    return experiment if seeds is None else _private(experiment, read_seeds(seeds), source)
+
+
+def _frozen(experiment: Experiment, frozen: Frozen | None) -> Experiment:
+    """The experiment as a suite, where a lock file lies beside it and has its name."""
+    if frozen is None or frozen.name != experiment.name:
+        return experiment
+    labels = [dataset.label for dataset in experiment.datasets if not dataset.optional]
+    frozen.check_rules(labels, [rule.to_dict() for rule in rules_of(experiment.to_dict())])
+    return replace(experiment, frozen=frozen, part=SuitePart(version=frozen.version))
+
+
+def _quick(experiment: Experiment, quick: QuickModel | None, source: YamlFile) -> Experiment:
+    """The smaller version of an experiment."""
+    if quick is None:
+        raise ConfigError(f"{source.name}: has no 'quick', so there is no smaller version of it")
+    return replace(
+        experiment,
+        datasets=tuple(replace(dataset, at_most=quick.captures) for dataset in experiment.datasets),
+        latency=experiment.latency.model_copy(update={"enabled": experiment.latency.enabled and quick.latency}),
+        stability=experiment.stability and quick.stability,
+        part=replace(experiment.part, quick=True),
+    )
+
+
+def _private(experiment: Experiment, seeds: Seeds, source: YamlFile) -> Experiment:
+    """The private half of an experiment: the datasets that have a seed, drawn from secret ones."""
+    drawn, left_out = [], []
+    for dataset in experiment.datasets:
+        if "seed" in registry.load_plugin("datasets", dataset.use).params_type().model_fields:
+            drawn.append(replace(dataset, secret={"seed": seeds.of(dataset.label)}))
+        else:
+            left_out.append(dataset.label)
+    if not drawn:
+        raise ConfigError(f"{source.name}: none of its datasets has a seed, so it has no private half")
+    part = replace(experiment.part, seeds=seeds.sha256)
+    return replace(experiment, datasets=tuple(drawn), left_out=tuple(left_out), part=part, frozen=None)
 
 
 def _datasets(model: ExperimentModel, source: YamlFile, roots: list[str]) -> tuple[DatasetSource, ...]:
     sources = dataset_sources(model.datasets, source, roots)
-    return tuple(replace(one, region=use.region) for one, use in zip(sources, model.datasets, strict=True))
+    uses = zip(sources, model.datasets, strict=True)
+    return tuple(replace(one, region=use.region, optional=use.optional, timed=use.latency) for one, use in uses)
 
 
 def _metrics(model: ExperimentModel, source: YamlFile) -> tuple[str, ...] | dict[str, Any]:

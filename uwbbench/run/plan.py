@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Literal
 
+from uwbbench.api.errors import CaptureError
 from uwbbench.api.interruption import by_plugin
 from uwbbench.api.text import one_line
 from uwbbench.config.detector import DetectorConfig
@@ -57,26 +58,41 @@ class Plan:
         Datasets whose captures could not be listed.
     scenes : dict of dict
         Scene of each capture, by dataset and capture.
+    skipped : dict of str
+        Optional datasets whose files are not there: the reason, by label.
     """
 
     units: tuple[Unit, ...]
     failures: tuple[Entry, ...]
     scenes: dict[str, dict[str, str]] = field(default_factory=dict)
+    skipped: dict[str, str] = field(default_factory=dict)
 
 
 def plan(experiment: Experiment) -> Plan:
-    """Plan of an experiment: lists the captures of its datasets, opens none."""
+    """Plan of an experiment: lists the captures of its datasets, and opens none but the first of an optional one.
+
+    Raises
+    ------
+    ChangedCapture
+        If a suite's datasets have other captures than those that it was frozen with.
+    """
     accuracy: list[Unit] = []
     latency: list[Unit] = []
     failures: list[Entry] = []
     scenes: dict[str, dict[str, str]] = {}
+    skipped: dict[str, str] = {}
     for source in experiment.datasets:
         try:
             references = source.references()
+            if source.optional:
+                references[0].open()
             scenes[source.label] = source.scenes([ref.name for ref in references])
         except BaseException as error:  # an adapter may raise anything; the other datasets still run
             if not by_plugin(error):
                 raise
+            if source.optional and isinstance(error, CaptureError):
+                skipped[source.label] = one_line(error, LONGEST_REASON)
+                continue
             failures.append(
                 Entry(
                     unit=listing_name(source.label),
@@ -89,10 +105,14 @@ def plan(experiment: Experiment) -> Plan:
                 )
             )
             continue
+        if experiment.frozen is not None and not source.optional:
+            names = [ref.name for ref in references]
+            experiment.frozen.check_names(source.label, names, all_of_them=not experiment.part.quick)
         accuracy += [Unit("accuracy", d, source.label, ref) for ref in references for d in experiment.detectors]
         timed = references if experiment.latency.captures == "all" else references[:1]
-        latency += [Unit("latency", d, source.label, ref) for ref in timed for d in experiment.runnable]
-    return Plan(tuple(accuracy + (latency if experiment.latency.enabled else [])), tuple(failures), scenes)
+        if source.timed:
+            latency += [Unit("latency", d, source.label, ref) for ref in timed for d in experiment.runnable]
+    return Plan(tuple(accuracy + (latency if experiment.latency.enabled else [])), tuple(failures), scenes, skipped)
 
 
 def reason_of(error: BaseException) -> str:

@@ -14,7 +14,7 @@ from uwbbench.api.arrays import FloatArray
 from uwbbench.api.capture import Capture, CaptureHeader
 from uwbbench.api.detections import HANDED_OUT, Detections
 from uwbbench.api.interruption import by_plugin, leave_to_parent
-from uwbbench.config.detector import RESULTS_FILE
+from uwbbench.config.detector import RESULTS_FILE, DetectorConfig
 from uwbbench.config.source import CaptureRef
 from uwbbench.detect.pipeline import Pipeline
 from uwbbench.detect.results_file import ResultsFile
@@ -27,6 +27,7 @@ from uwbbench.run.folder.journal import Entry, Status
 from uwbbench.run.folder.reported import REPORTED_FACT, RESULTS_FACT, reported_times
 from uwbbench.run.folder.scored import scorable, score_rows, with_causes
 from uwbbench.run.plan import Unit, reason_of
+from uwbbench.run.suite import ChangedCapture, Frozen
 
 
 @dataclass(frozen=True)
@@ -41,12 +42,15 @@ class Job:
         Distinct for each run: a worker that outlives a run must not use its captures for the next.
     parent : int
         The process that runs the experiment.
+    frozen : Frozen or None
+        What the capture is held against.
     """
 
     unit: Unit
     rules: tuple[ScoringRules, ...]
     session: str
     parent: int
+    frozen: Frozen | None = None
 
 
 @dataclass(frozen=True)
@@ -85,6 +89,20 @@ def _opened(session: str, ref: CaptureRef) -> Capture:
     return _last[0][2]
 
 
+_pipelines: dict[tuple[str, str], tuple[Pipeline, str]] = {}
+
+
+def _checked(session: str, detector: DetectorConfig) -> tuple[Pipeline, str]:
+    """Pipeline of a detector with its identity, for which all sources are read; kept as long as the run lasts."""
+    known = _pipelines.get((session, detector.name))
+    if known is None:
+        for old in [key for key in _pipelines if key[0] != session]:
+            del _pipelines[old]
+        pipeline = Pipeline(detector)
+        known = _pipelines[session, detector.name] = pipeline, pipeline.identity
+    return known
+
+
 def content_of(job: Job) -> str:
     """SHA-256 of a unit's capture; empty where it cannot be opened."""
     try:
@@ -121,7 +139,7 @@ def run_unit(job: Job) -> Finished:
         with threadpool_limits(1):
             finished = _detected(job)
     except BaseException as error:  # a plugin may raise anything; the other units still run
-        if not by_plugin(error):
+        if not by_plugin(error) or isinstance(error, ChangedCapture):
             raise
         return Finished(entry_of(unit, "failed", reason=reason_of(error), traceback=traceback.format_exc()))
     finished.entry.facts["elapsed_s"] = time.perf_counter() - started
@@ -131,11 +149,13 @@ def run_unit(job: Job) -> Finished:
 def _detected(job: Job) -> Finished:
     unit = job.unit
     capture = _opened(job.session, unit.ref)
+    if job.frozen is not None:
+        job.frozen.check(unit.dataset, unit.ref.name, capture)
     if unit.detector.results is None:
-        pipeline = Pipeline(unit.detector)
+        pipeline, identity = _checked(job.session, unit.detector)
         # Kernels count nothing that they drop, so a second pass tells; plain stages do so in the first.
         detections = pipeline.run(capture, candidates=not pipeline.open(capture).fused, handed_out=True)
-        identity, stored, results = pipeline.identity, None, dict[str, Any]()
+        stored, results = None, dict[str, Any]()
     else:
         stored, results = _read(unit, capture)
         detections, identity = stored.detections, ResultsFolder(unit.detector).identity(stored.sha256)

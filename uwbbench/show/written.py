@@ -136,7 +136,7 @@ def write_figures(report: Report, folder: Path, roots: Sequence[Path], *, force:
 
 
 def write_into_run(report: Report, roots: Sequence[Path]) -> tuple[Path, str]:
-    """Write ``report.md`` and ``report.html`` into the run folder.
+    """Write ``report.md`` and ``report.html`` into the run folder; of a quick run only the first, to save time.
 
     Parameters
     ----------
@@ -149,12 +149,14 @@ def write_into_run(report: Report, roots: Sequence[Path]) -> tuple[Path, str]:
     path : Path
         The page, or ``report.md`` where a page cannot be made.
     missing : str
-        Why there is no page; empty where there is.
+        Why there is no page; empty where there is one.
     """
     from uwbbench.show.extras import ReportToolsError
     from uwbbench.show.text.report import write_report
 
     path = write_report(report)
+    if report.experiment.get("suite", {}).get("quick"):
+        return path, f"no page of a quick run; 'uwbbench report {report.folder.path} -o report.html' writes one"
     try:
         return report.folder.write_text("report.html", as_text(report, Format.HTML, roots)), ""
     except ReportToolsError as error:

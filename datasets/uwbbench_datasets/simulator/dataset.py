@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any, ClassVar
@@ -19,6 +21,7 @@ class SimulatedParams(Params):
 
     scenes: list[str] = Field(min_length=1, description="Shipped names, or paths of scene files.")
     set: dict[str, Any] = Field(default_factory=dict, description="Values to change in each scene, by path.")
+    seed: int | None = Field(None, ge=0, description="Of all draws; as the scene says if left out.")
     runs: int | None = Field(None, ge=1, le=10_000, description="Runs of each variant; as the scene says if left out.")
 
 
@@ -47,7 +50,7 @@ class Simulated(Dataset[SimulatedParams]):
         """Scene and run by ``scene/variant/run``."""
         runs: dict[str, tuple[Scene, int]] = {}
         for name in self.params.scenes:
-            for scene in read_scenes(self._file(name), self.params.set):
+            for scene in map(self._seeded, read_scenes(self._file(name), self.params.set)):
                 for run in range(1, (self.params.runs or scene.model.runs) + 1):
                     if f"{scene.name}/{run}" in runs:
                         raise ConfigError(f"two scenes are named '{scene.name}'; give one of them another name")
@@ -60,6 +63,13 @@ class Simulated(Dataset[SimulatedParams]):
                 if (root / name).is_file():
                     return root / name
         return find_config("scenes", name)
+
+    def _seeded(self, scene: Scene) -> Scene:
+        """The scene with the dataset's seed, from which each scene and variant draws otherwise."""
+        if self.params.seed is None:
+            return scene
+        number = hashlib.sha256(f"{self.params.seed} {scene.name}".encode()).digest()[:16]
+        return replace(scene, model=scene.model.model_copy(update={"seed": int.from_bytes(number)}))
 
     def runs(self) -> list[str]:
         """Names of the runs, each of which holds all receivers: ``scene/variant/run``."""
@@ -88,8 +98,10 @@ class Simulated(Dataset[SimulatedParams]):
         return {run: receivers[0]} if len(receivers) == 1 else {f"{run}/{name}": name for name in receivers}
 
     def scene(self, name: str) -> str:
-        """Scene with its variant; runs of it, and receivers on one robot, are no other scenes."""
-        return next((scene.name for run, (scene, _) in self._runs.items() if name in self._captures(run)), name)
+        """Scene with its variant, and with the run where runs draw places anew; receivers are no other scenes."""
+        runs = self._runs.items()
+        own = ((run if scene.model.draw else scene.name) for run, (scene, _) in runs if name in self._captures(run))
+        return next(own, name)
 
     def open(self, name: str) -> Capture:
         """Simulate the run that a capture belongs to."""

@@ -107,6 +107,7 @@ def simulate(scene: Scene, run: int = 1, *, threads: int = 1) -> Simulation:
     CaptureError
         If the trajectory's file cannot be used, or a term gives paths that are not finite.
     """
+    scene = scene.of_run(run)
     trajectory = sampled(scene.model.trajectory, scene.model.radar.frame_rate_hz, scene.folder)
     objects = tuple(item.body() for item in scene.model.objects)
     captures, contributions = [], {}

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import itertools
+import zlib
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import cache, partial
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -91,6 +92,9 @@ class SceneModel(SceneNames):
     objects: list[ObjectModel] = Field(default_factory=list)
     terms: list[TermUse] = Field(min_length=1, description="What frames are made of; the order counts in each hook.")
     fidelity: FidelityModel = FidelityModel()
+    draw: dict[str, Annotated[list[float], Field(min_length=2, max_length=2)]] = Field(
+        default_factory=dict, description="Values by path that each run draws anew, evenly between two ends."
+    )
 
     @model_validator(mode="after")
     def _names_differ(self) -> SceneModel:
@@ -124,6 +128,8 @@ class Scene:
         Of what is drawn once for the robot; None where each run draws it anew.
     robot : str
         Name of the robot; empty where the scene names none.
+    source : YamlFile
+        Its file, with the values of this variant.
     """
 
     name: str
@@ -132,6 +138,25 @@ class Scene:
     folder: Path
     robot_seed: int | None = None
     robot: str = ""
+    source: YamlFile = field(default_factory=lambda: YamlFile("scene", {}, {}), repr=False, compare=False)
+
+    def of_run(self, run: int) -> Scene:
+        """The scene with what a run draws anew; each path has a random stream of its own.
+
+        Raises
+        ------
+        ConfigError, PluginError
+            If a path leads nowhere, or to a value that may not be so.
+        """
+        if not self.model.draw:
+            return self
+        drawn = {}
+        for path, (low, high) in self.model.draw.items():
+            stream = np.random.SeedSequence(self.model.seed, spawn_key=(run, zlib.crc32(path.encode())))
+            drawn[path] = float(np.random.Generator(np.random.SFC64(stream)).uniform(low, high))
+        data = with_values(self.source.data, {**drawn, "seed": self.model.seed}, self.source.place(("draw",)))
+        robot_named = partial(read_robot, folder=self.folder, place=self.source.place(("robot",)))
+        return _scene(self.name, data, self.source, self.folder, robot_named)
 
     def radar(self, receiver: str) -> Radar:
         """Radar of one receiver."""
@@ -192,6 +217,7 @@ def read_scenes(path: Path, changes: Mapping[str, Any] | None = None) -> list[Sc
         parts = [f"{labels[key]}-{_text(vary[key], value)}" for key, value in chosen.items()]
         whole = "/".join([name, *(["_".join(parts)] if parts else [])])
         scenes.append(_scene(whole, variant, source, path.parent, robot_named))
+        scenes[-1].of_run(1)  # so that a path that leads nowhere is found before anything is simulated
     return scenes
 
 
@@ -211,7 +237,8 @@ def _scene(
         model = model.model_copy(update={"radar": robot.radar(model.radar, source)})
     own_seed = robot.model.seed if robot else None
     seed = own_seed if model.robot_seed is None else model.robot_seed
-    return Scene(name, model, _terms(model, robot, source), folder, seed, robot.model.name if robot else "")
+    terms, called = _terms(model, robot, source), robot.model.name if robot else ""
+    return Scene(name, model, terms, folder, seed, called, replace(source, data=dict(data)))
 
 
 def _short_names(paths: list[str]) -> dict[str, str]:

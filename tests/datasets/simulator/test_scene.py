@@ -136,3 +136,42 @@ def test_two_scenes_of_one_name_are_refused(write, tmp_path: Path) -> None:
 
 def test_the_dataset_is_registered() -> None:
     assert load_plugin("datasets", "simulated") is Simulated
+
+
+DRAWN = "draw:\n  objects.plate.center_m.1: [-0.3, 0.3]\n"
+
+
+def middle_m(capture) -> float:
+    return float(capture.truth.objects[0].outline_m[:, 1].mean())
+
+
+def test_each_run_draws_its_own_values_within_the_ends_and_the_same_ones_again(write) -> None:
+    dataset = Simulated(SimulatedParams(scenes=[str(write(extra=DRAWN))], runs=5, seed=4), [])
+    places = [middle_m(dataset.open(name)) for name in dataset.names()]
+    assert len(set(places)) == 5
+    assert all(-0.3 <= place <= 0.3 for place in places)
+    again = Simulated(SimulatedParams(scenes=[str(write(extra=DRAWN))], runs=5, seed=4), [])
+    assert again.open("room/3").sha256 == dataset.open("room/3").sha256
+
+
+def test_runs_that_draw_places_are_scenes_of_their_own_and_others_are_not(write) -> None:
+    for text, scenes in ((DRAWN, {"room/1", "room/2"}), ("", {"room"})):
+        dataset = Simulated(SimulatedParams(scenes=[str(write(extra=text))], runs=2), [])
+        assert {dataset.scene(name) for name in dataset.names()} == scenes
+
+
+def test_a_drawn_value_that_leads_nowhere_is_named_before_anything_is_simulated(write) -> None:
+    with pytest.raises(ConfigError, match="no item 'plat"):
+        read_scenes(write(extra="draw:\n  objects.plat.center_m.1: [-0.3, 0.3]\n"))
+
+
+def test_the_seed_of_the_dataset_gives_every_scene_and_variant_other_draws(write) -> None:
+    path = str(write(extra="vary:\n  objects.plate.material: [metal, plywood]\n" + DRAWN))
+
+    def places(seed: int | None) -> list[float]:
+        dataset = Simulated(SimulatedParams(scenes=[path], seed=seed), [])
+        return [middle_m(dataset.open(name)) for name in dataset.names()]
+
+    first, second = places(None)
+    assert first == second  # the seed of the scene: the same for both variants
+    assert len({*places(1), *places(2)}) == 4

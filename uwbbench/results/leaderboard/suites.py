@@ -3,7 +3,9 @@
 Conventions
 -----------
 * A suite is the name of an experiment. Its version is a hash of the content of its captures and of its scoring rules:
-  only what was measured in the same version is compared.
+  only what was measured in the same version is compared. Where the experiment was frozen, the version is that of all
+  its captures but those of optional datasets, and every run has checked them.
+* The public half of a suite, private halves by their seeds, and quick runs of each are never put together.
 * A capture that a run could not open has no known content there; such a run belongs to the version whose other
   captures it shares.
 * A detector is its name with its identity (steps, parameters and sources). The same name with another identity is
@@ -26,7 +28,7 @@ import numpy as np
 from uwbbench.measure.accuracy.metrics.choice import MetricChoice, combined
 from uwbbench.results.leaderboard.runs import Run
 from uwbbench.results.results import Scored
-from uwbbench.run.folder.identity import canonical, digest
+from uwbbench.run.folder.identity import canonical, digest, suite_version
 from uwbbench.run.folder.journal import Entry
 
 CaptureKey = tuple[str, str]
@@ -100,6 +102,17 @@ class Suite:
     contenders: list[Contender]
 
     @property
+    def part(self) -> Mapping[str, Any]:
+        """Which part of a frozen suite it is: ``version``, ``quick`` and the hash of ``seeds``, as runs store them."""
+        return _part(self.newest)
+
+    def is_public_half_of(self, other: Suite) -> bool:
+        """Whether another suite has the same scenes and rules, drawn from secret seeds."""
+        mine, its = dict(self.part), dict(other.part)
+        alike = self.name == other.name and not mine.pop("seeds") and bool(its.pop("seeds"))
+        return alike and mine == its
+
+    @property
     def newest(self) -> Run:
         """The run whose description is shown."""
         return self.runs[-1]
@@ -140,14 +153,15 @@ def _versions(runs: Sequence[Run]) -> Iterator[tuple[str, list[Run], dict[Captur
     for run in runs:
         captures = _captures(run)
         rules = [rule.to_dict() for rule in run.rules]
-        alike[canonical([run.experiment["name"], rules, sorted(captures)])].append((run, captures))
+        compared = [key for key in captures if key[0] not in _optional(run)]
+        alike[canonical([run.experiment["name"], rules, sorted(compared), _part(run)])].append((run, captures))
     for members in alike.values():
         versions: list[tuple[list[Run], dict[CaptureKey, str]]] = []
         for run, captures in sorted(members, key=lambda one: list(one[1].values()).count("")):
             for into, known in versions:
-                if all(not content or known[key] in ("", content) for key, content in captures.items()):
+                if all(not content or known.get(key, "") in ("", content) for key, content in captures.items()):
                     into.append(run)
-                    known.update({key: content for key, content in captures.items() if content})
+                    known.update({key: content for key, content in captures.items() if content or key not in known})
                     break
             else:
                 versions.append(([run], dict(captures)))
@@ -155,19 +169,36 @@ def _versions(runs: Sequence[Run]) -> Iterator[tuple[str, list[Run], dict[Captur
             yield into[0].experiment["name"], [run for run in runs if run in into], known
 
 
+def _part(run: Run) -> Mapping[str, Any]:
+    """Which part of a suite a run is of; of experiments that were not frozen, and of older runs, all of it."""
+    part: Mapping[str, Any] = run.experiment.get("suite", {"version": "", "quick": False, "seeds": ""})
+    return part
+
+
+def _optional(run: Run) -> set[str]:
+    """Datasets of a run that others need not have."""
+    return {used["label"] for used in run.experiment["datasets"] if used.get("optional")}
+
+
 def _captures(run: Run) -> dict[CaptureKey, str]:
-    """Content of each capture of a run; empty where it was not opened."""
+    """Content of each capture of a run; empty where it was not opened.
+
+    Of a frozen capture, which the run has checked, it is what was frozen: another processor may differ in last bits.
+    """
     contents: dict[CaptureKey, str] = {}
+    frozen = run.manifest.get("frozen", {})
     for entry in run.entries:
         if entry.kind == "accuracy":
             content = run.manifest["data"].get(entry.capture_id, "")
+            content = content and frozen.get(entry.dataset, {}).get(entry.capture, content)
             contents[entry.dataset, entry.capture] = content or contents.get((entry.dataset, entry.capture), "")
     return contents
 
 
 def _suite(name: str, runs: list[Run], captures: dict[CaptureKey, str]) -> Suite:
-    rules = [rule.to_dict() for rule in runs[0].rules]
-    version = digest([sorted([*key, content] for key, content in captures.items()), rules])
+    optional = {label for run in runs for label in _optional(run)}
+    compared = {key: content for key, content in captures.items() if key[0] not in optional}
+    version = suite_version(compared, [rule.to_dict() for rule in runs[0].rules])
     contenders: dict[tuple[str, str], Contender] = {}
     for run in runs:
         configs = {config["name"]: config for config in run.experiment["detectors"]}

@@ -66,6 +66,19 @@ def file_id(value: Any) -> str:
     return digest(value)[:20]
 
 
+def suite_version(captures: Mapping[tuple[str, str], str], rules: Any) -> str:
+    """Version of a suite: what is measured on the same captures under the same rules.
+
+    Parameters
+    ----------
+    captures : mapping
+        Content of each capture by dataset and name; empty where nobody could open it.
+    rules : object
+        Scoring rules as plain values.
+    """
+    return digest([sorted([*key, content] for key, content in captures.items()), rules])
+
+
 def capture_name(dataset: str, params: Mapping[str, Any], capture: str) -> str:
     """Name of the files of a capture.
 

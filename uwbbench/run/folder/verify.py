@@ -279,7 +279,8 @@ class _Verifier:
             expected.add(("stability", "", ""))
         if experiment["latency"]["enabled"] and set(detectors) > read_only:
             timed = {unit[2] for unit in units if unit[0] == "latency"}
-            for dataset in sorted({unit[2] for unit in units if unit[0] == "accuracy"} - timed):
+            untimed = {used["label"] for used in experiment["datasets"] if used.get("latency") is False}
+            for dataset in sorted({unit[2] for unit in units if unit[0] == "accuracy"} - timed - untimed):
                 self._problem("journal.jsonl", f"no line about times on {_shown(dataset)}")
         for kind, dataset, capture in sorted(expected):
             for detector in detectors:

@@ -52,6 +52,8 @@ def look(content: Content, case: Case) -> dict[str, Any]:
 def _image(content: Content, case: Case) -> tuple[tuple[str, float] | None, str]:
     if content.roots is None:
         return None, "Captures were not looked for."
+    if content.report.experiment.get("suite", {}).get("seeds"):
+        return None, "Capture not at hand: it was drawn from secret seeds."
     used = next(one for one in content.report.experiment["datasets"] if one["label"] == case.dataset)
     sha256 = content.report.folder.content(case.capture_id)
     try:

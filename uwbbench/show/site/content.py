@@ -20,6 +20,7 @@ from uwbbench.show.looks import Look, looks
 from uwbbench.show.site import charts
 from uwbbench.show.site.cells import metric_cell, pair_cell, pair_text, quantity, rank_cell, speed_cell
 from uwbbench.show.site.error_pictures import error_pictures
+from uwbbench.show.site.halves import halves_dict
 from uwbbench.show.site.names import Names
 from uwbbench.show.text.numbers import p_value
 from uwbbench.show.text.quantity import undefined_titles
@@ -247,20 +248,34 @@ class Content:
                 "version",
                 f"{suite.version[:12]}, of the content of {len(suite.captures)} captures and the scoring rules",
             ),
+            *self._frozen_facts(suite),
             ("scoring", f"{', '.join(rule.scoring for rule in rules)}; gate {100 * rules[0].gate_m:g} cm"),
             ("runs", ", ".join(shown(run.name) for run in suite.runs)),
             ("machines", "; ".join(sentence(machine) for machine in machines)),
             ("reference of times", "none" if reference is None else f"{shown(reference[0])}, {TIMED[reference[2]]}"),
         ]
 
+    @staticmethod
+    def _frozen_facts(suite: Suite) -> Iterator[tuple[str, str]]:
+        """Which part of a frozen suite it is."""
+        part = suite.part
+        if part["version"]:
+            yield "frozen as", f"{part['version'][:12]}; every capture was checked against it"
+        if part["quick"]:
+            yield "quick", "some of the captures only; not to be compared with the whole suite"
+        if part["seeds"]:
+            yield "private half", f"secret seeds {part['seeds'][:12]}; nobody could tune to these captures"
+
     def to_dict(self) -> dict[str, Any]:
         """Everything for programs; undefined numbers are NaN, which the store writes as null."""
         return {
             "generator": "uwbbench leaderboard",
+            "halves": halves_dict(self),
             "suites": [
                 {
                     "name": suite.name,
                     "version": suite.version,
+                    "part": dict(suite.part),
                     "runs": [run.name for run in suite.runs],
                     "captures": [
                         {"dataset": dataset, "capture": capture, "sha256": content}

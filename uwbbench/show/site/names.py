@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Sequence
 
 from uwbbench.config.detector import from_results, marked
@@ -41,14 +42,18 @@ class Names:
         }
         distinct = labels(versioned.values(), longest=60)
         self.detectors = {key: distinct[text] for key, text in versioned.items()}
-        self._several: dict[str, int] = {}
-        for suite in suites:
-            self._several[suite.name] = self._several.get(suite.name, 0) + 1
+        self._several = Counter((suite.name, tuple(suite.part.values())) for suite in suites)
 
     def suite(self, suite: Suite) -> str:
-        """Name of a suite, with its version where there are several."""
-        name = shown(suite.name)
-        return f"{name} (version {suite.version[:SHORT]})" if self._several[suite.name] > 1 else name
+        """Name of a suite, with which part of it this is, and its version where there are several."""
+        name, part = shown(suite.name), suite.part
+        said = [
+            *(["quick"] if part["quick"] else []),
+            *([f"private, {part['seeds'][:SHORT]}"] if part["seeds"] else []),
+        ]
+        if self._several[suite.name, tuple(part.values())] > 1:
+            said.append(f"version {suite.version[:SHORT]}")
+        return f"{name} ({', '.join(said)})" if said else name
 
     @staticmethod
     def detector_page(contender: Contender) -> str:

@@ -17,6 +17,7 @@ from uwbbench.show.html.cell import Cell, Table
 from uwbbench.show.html.render import badge
 from uwbbench.show.site.cells import metric_cell, pair_cell, quantity, rank_cell
 from uwbbench.show.site.content import Content, Section
+from uwbbench.show.site.halves import halves_shown
 from uwbbench.show.site.matrix import CSV, matrix
 from uwbbench.show.text.numbers import interval, number, p_value
 from uwbbench.show.text.sheet import sentence, shown
@@ -114,6 +115,7 @@ def _index(content: Content) -> Page:
     parts = []
     if content.sections:
         parts.append(Part("All detectors on all datasets", tables=(matrix(content),), download=CSV))
+    parts += [Part(title, (text,), tables=(table,)) for title, text, table in halves_shown(content)]
     for suite in content.suites:
         sections = content.of_suite(suite)
         name = content.names.suite(suite)
