@@ -60,10 +60,9 @@ def _published(run: uwbbench.Run, folder: Path) -> int:
     board = board_of(run)
     _replace(README, readme_text(board))
     _replace(PAGE, advice_text(board, run))
-    counts = _counts(run)
-    counts[[key in _quick() for key in zip(counts["dataset"], counts["capture"], strict=True)]].to_csv(
-        SCORES, index=False
-    )
+    counts, quick = _counts(run), _quick()
+    kept = [key in quick for key in zip(counts["dataset"], counts["capture"], strict=True)]
+    counts[kept].to_csv(SCORES, index=False)
     CHART.write_text(_chart(run, board.timed[0]), encoding="utf-8")
     _photograph(run.path / "report.html", folder / "report.png")
     print(f"written: {README}, {PAGE}, {SCORES}, {CHART}; the site is in {folder / 'site'}")  # noqa: T201
