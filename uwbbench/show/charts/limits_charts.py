@@ -38,7 +38,7 @@ def error_against_snr(table: pd.DataFrame, names: Mapping[str, str]) -> Spec:
             "found": f"{number(row['share'], 3)} {between(row['low'], row['high'], 3)} of {row['n']} echoes",
         }
         for row in table.to_dict("records")
-        if 0 < row["rmse_m"] < math.inf  # no error at all, as of one that looks up the truth, has no place on a log axis
+        if 0 < row["rmse_m"] < math.inf  # no error at all, of one that looks up the truth, has no place on a log axis
     ]
     bounds = sorted({(row["snr_db"], 100 * row["bound_m"]) for row in table.to_dict("records")})
     bound = [{"snr": snr_db, "error": bound_cm} for snr_db, bound_cm in bounds]
