@@ -14,7 +14,7 @@ import pytest
 import uwbbench as package
 from uwbbench.cli import app
 
-COMMANDS = [command.name or command.callback.__name__ for command in app.registered_commands]
+COMMANDS = [command.name or command.callback.__name__.replace("_", "-") for command in app.registered_commands]
 NUMERICAL = {"numpy", "scipy", "sklearn", "numba", "llvmlite", "pandas", "h5py", "pyarrow", "matplotlib", "joblib"}
 PLUGINS = {"uwbbench_detectors", "uwbbench_datasets"}
 NOT_FOR_HELP = {*NUMERICAL, *PLUGINS, "pydantic", "yaml", "rich", "importlib.metadata", "multiprocessing"}

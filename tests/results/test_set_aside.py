@@ -15,7 +15,7 @@ EXPERIMENT = """\
 schema: 1
 name: bold
 detectors:
-  - {use: cfar-os, name: bold, set: {pipeline.cfar.os.params.false_alarm_rate: 0.1}}
+  - {use: cfar-os, name: bold, set: {pipeline.cfar.os.params.false_alarm_rate: 0.1, pipeline.cfar.os.params.cells: all}}
   - paper-filtering
 datasets:
   - {use: approach, name: plate, params: {speed_m_s: 1.5}}

@@ -133,7 +133,7 @@ def validate(
         list[Path], typer.Argument(metavar="FILE...", help="Detector, experiment, scene, gate, tuning or fit.")
     ],
 ) -> None:
-    """Check detector, experiment, scene, gate, tuning and fit files. Mistakes are named with file, line and key."""
+    """Check files: detectors, experiments, scenes, fits, gates. Mistakes are named with file, line and key."""
     from uwbbench.cli import describe
 
     wrong = False

@@ -131,7 +131,7 @@ def direct_path_120_db_above_the_floor(subject: StagesOnTrial) -> Evidence:
     noise = (rng.normal(size=(40, TAPS)) + 1j * rng.normal(size=(40, TAPS))) / np.sqrt(2)
     noise[:, 38] += 30.0
     stage = subject.stage("cfar")
-    reach = stage.params.training_taps + 2 * stage.params.guard_taps
+    reach = sum(stage.params.window_for(subject.radar))
     crest = 7
     quiet = subject.through(stage, subject.block_of(noise)).detections
     for level_db in DROWNING_DB:
@@ -158,7 +158,7 @@ def training_cells_summed(subject: StagesOnTrial) -> Evidence:
     ``math.fsum``. Only for cell averaging, whose estimate is a plain mean.
     """
     stage = subject.stage("cfar.ca", cells="all")
-    half, guard = stage.params.training_taps // 2, stage.params.guard_taps
+    half, guard = stage.params.window_for(subject.radar)
     rng = np.random.default_rng(23)
     tap = TAPS // 2 + 2
     amplitude = 10 ** rng.uniform(-8, 0, (50, TAPS))

@@ -108,6 +108,9 @@ class RunningSums(Stage[Params]):
         training_taps: int = 12
         guard_taps: int = 0
 
+        def window_for(self, radar):
+            return self.training_taps // 2, self.guard_taps
+
     @classmethod
     def params_type(cls):
         return cls.Window
