@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from uwbbench.api.text import counted
 from uwbbench.cli import options
 
 
@@ -28,7 +29,7 @@ def freeze(
     count = sum(map(len, after.captures.values()))
     if before is None or before.version == after.version:
         said = "is frozen as" if before is None else "is still"
-        typer.echo(f"{after.name} {said} version {after.version[:12]}: {count} captures, {after.path}")
+        typer.echo(f"{after.name} {said} version {after.version[:12]}: {counted(count, 'capture')}, {after.path}")
         return
     old, new = before.contents(), after.contents()
     changed = sum(old.get(label, {}).get(name) != sha for label, of in new.items() for name, sha in of.items())
