@@ -12,7 +12,7 @@ from tables import Board
 import uwbbench
 from uwbbench.measure.accuracy.metrics.choice import MetricChoice
 from uwbbench.results.results import scored
-from uwbbench.results.slices import ALL, slices
+from uwbbench.results.slices import ALL, Slice, slices
 from uwbbench.run.folder import RunFolder
 
 DISTANCES_M = (0.5, 1.0, 2.0, 3.5)
@@ -106,16 +106,16 @@ def _by_distance(board: Board, run: uwbbench.Run) -> Iterator[str]:
         yield f"| {dataset} | {' | '.join(cells)} |"
 
 
-def _best(cuts: Iterable[object]) -> str:
-    values = sorted(((one.estimates["recall"].value, one.detector) for one in cuts), reverse=True)[:3]  # type: ignore[attr-defined]
+def _best(cuts: Iterable[Slice]) -> str:
+    values = sorted(((one.estimates["recall"].value, one.detector) for one in cuts), reverse=True)[:3]
     return ", ".join(f"`{name}` {value:.2f}" for value, name in values)
 
 
 def _by_budget(board: Board) -> Iterator[str]:
     """The best F1 for so much time."""
     yield (
-        "Time of a frame from samples to rows, in times of `paper-filtering`, measured in turns on one machine; it "
-        "takes some microseconds there. `uwbbench time` measures it on yours."
+        "Time of a frame from samples to rows, in times of `paper-filtering`, measured in turns on one machine. "
+        "`uwbbench time` measures it on yours."
     )
     yield ""
     yield f"| at most | {' | '.join(board.timed)} |"
