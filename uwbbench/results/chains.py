@@ -13,6 +13,16 @@ from uwbbench.run.folder.journal import Entry
 if TYPE_CHECKING:
     import pandas as pd
 
+    from uwbbench.api.detections import Detections
+
+IN_CLUSTERS = "in clusters"
+"""Step behind the last one: detections that a cluster holds."""
+
+
+def in_clusters(detections: Detections) -> int | None:
+    """Detections that a cluster holds; None where nothing clusters them."""
+    return int((detections["cluster"] >= 0).sum()) if "cluster" in detections else None
+
 
 def chains_of(folder: RunFolder, entries: Iterable[Entry]) -> pd.DataFrame:
     """One row for each detector, dataset and step, in the order of the experiment.
@@ -31,9 +41,9 @@ def chains_of(folder: RunFolder, entries: Iterable[Entry]) -> pd.DataFrame:
     for entry in entries:
         for step, count in entry.facts["chain"].items():
             counts[entry.detector, entry.dataset, step].append(count)
-        detections = folder.detections(entry.unit)
-        if "cluster" in detections:
-            counts[entry.detector, entry.dataset, "in clusters"].append(int((detections["cluster"] >= 0).sum()))
+        clustered = in_clusters(folder.detections(entry.unit))
+        if clustered is not None:
+            counts[entry.detector, entry.dataset, IN_CLUSTERS].append(clustered)
     columns = ["detector", "dataset", "step", "count", "captures", "mean", "low", "high"]
     rows = []
     for key, each in counts.items():

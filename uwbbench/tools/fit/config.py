@@ -22,6 +22,7 @@ from uwbbench.config.model import ConfigModel
 from uwbbench.config.rules import GateRadius, RegionModel, Scoring, Surface
 from uwbbench.detect.pipeline import Pipeline
 from uwbbench.measure.accuracy.scoring import Region, ScoringRules
+from uwbbench.results.chains import IN_CLUSTERS
 from uwbbench.run.experiment import DetectorUse
 from uwbbench.tools.fit.files import ROBOT, Changes, changed, open_cell
 from uwbbench.tools.tune.config import Choices, Interval
@@ -29,9 +30,6 @@ from uwbbench.tools.tune.search import within
 
 CHAIN = "chain"
 """Key of targets that count detections behind the steps of a detector, and of their tolerance."""
-
-IN_CLUSTERS = "in clusters"
-"""Name of the count of detections that belong to a cluster, which no step of a chain holds."""
 
 SMALLEST_SPAN = 1e-3
 

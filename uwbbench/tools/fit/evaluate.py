@@ -16,7 +16,8 @@ from uwbbench.detect.pipeline import Pipeline
 from uwbbench.measure.accuracy.counts import reach_of_mean
 from uwbbench.measure.accuracy.scoring import outcomes
 from uwbbench.measure.accuracy.stats import evaluate
-from uwbbench.tools.fit.config import CHAIN, IN_CLUSTERS, Cell, Target
+from uwbbench.results.chains import IN_CLUSTERS, in_clusters
+from uwbbench.tools.fit.config import CHAIN, Cell, Target
 from uwbbench.tools.fit.files import Files, open_cell
 
 FARTHEST = 10.0
@@ -87,8 +88,7 @@ def run_cell(files: Files, cell: Cell, seeds: Sequence[int], runs: int) -> Found
             detections = pipeline.run(capture, candidates=True)
             for table, outcome in outcomes(detections, capture.header, cell.rules).items():
                 found.outcomes.setdefault(table, []).append(outcome)
-            clustered = int((detections["cluster"] >= 0).sum()) if "cluster" in detections else 0
-            found.counts.append({**detections.chain, IN_CLUSTERS: clustered})
+            found.counts.append({**detections.chain, IN_CLUSTERS: in_clusters(detections) or 0})
     return found
 
 
