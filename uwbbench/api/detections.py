@@ -27,13 +27,24 @@ COLUMNS = (
     "prominence",
     "width_taps",
     "pdoa_rad",
+    "track",
+    "range_rate_m_s",
+    "range_sd_m",
+    "range_start_m",
+    "range_stop_m",
+    "probability",
 )
-"""Columns of every exported table, in this order; a column that no stage computed is empty there."""
+"""Columns of every exported table, in this order; a column that no stage computed is empty there.
+
+``track`` is the number of the confirmed track that a row belongs to, -1 of none; ``range_rate_m_s`` and ``range_sd_m``
+are a tracker's. ``range_start_m`` and ``range_stop_m`` bound a segment, whose ``range_m`` lies where it is strongest.
+``probability`` says how sure a detector is; a row with it and without a range speaks of its frame as a whole.
+"""
 
 HANDED_OUT = "handed_out"
 """Column of :meth:`Detections.with_hand_outs`."""
 
-_INTEGER = ("frame", "cluster", HANDED_OUT)
+_INTEGER = ("frame", "cluster", "track", HANDED_OUT)
 
 _Table = tuple[Sequence[str], FloatArray]
 """Names of columns, and the frames and these columns as one array."""
@@ -295,7 +306,7 @@ class Detections:
 
     @staticmethod
     def join(parts: Sequence[Detections]) -> Detections:
-        """Stack tables; a column that only some of them computed is NaN (cluster: -1) in the others."""
+        """Stack tables; a column that only some of them computed is NaN (cluster and track: -1) in the others."""
         names: list[str] = []
         for part in parts:
             names += [name for name in part.columns if name not in names and name != "frame"]
@@ -334,10 +345,10 @@ class Detections:
     def to_pandas(self) -> pd.DataFrame:
         """Table with :data:`COLUMNS` first, then columns of plugins.
 
-        ``cluster`` is a nullable integer: -1 is noise, missing means that no clustering ran.
+        ``cluster`` and ``track`` are nullable integers: -1 is noise or no track, missing means that no stage made any.
         """
         import pandas as pd
 
         extra = [name for name in self.columns if name not in COLUMNS]
         table = pd.DataFrame({name: self[name] for name in (*COLUMNS, *extra)})
-        return table.astype({"cluster": "Int64"})
+        return table.astype({"cluster": "Int64", "track": "Int64"})

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from typing import Any, ClassVar, Generic, Literal, TypeVar, get_args, get_origin
 
 from pydantic import BaseModel, ConfigDict
@@ -55,8 +56,8 @@ class Stage(Generic[P]):
     removes : frozenset of str
         Ports that are gone behind this stage, for example ``frames`` where detections are held back.
     needs : frozenset of str
-        What the capture must have: ``sts``, ``truth`` or a reported ``first_path``. A batch reads STS responses only
-        where a stage needs them.
+        What the capture must have: ``sts``, ``truth``, a reported ``first_path`` or a ``background``. A batch reads STS
+        responses only where a stage needs them.
     rowwise : bool
         True where each detection's new columns depend on that row and its frame alone. Rejected candidates are then
         described in the same way, for scorings that ask what the filters removed.
@@ -137,6 +138,15 @@ class Stage(Generic[P]):
 
     def show_truth(self, truth: Truth, trajectory: Trajectory) -> None:
         """Receive the ground truth; called only for stages that need ``truth``, which no real detector does."""
+
+    def show_background(self, blocks: Iterable[Block]) -> None:
+        """Receive what the radar records with nothing in view; called for stages that need a ``background``.
+
+        Parameters
+        ----------
+        blocks : iterable of Block
+            Frames of the background capture in order, as the steps before this one leave them; read once.
+        """
 
     def step(self, block: Block) -> Block:
         """Block with what this stage adds; may cover other frames than it was given, if it holds some back."""
