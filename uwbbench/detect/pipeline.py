@@ -20,6 +20,7 @@ from uwbbench.api.kernel import Kernel
 from uwbbench.api.stage import Stage
 from uwbbench.config.detector import KERNEL, DetectorConfig, detector_from_text, detector_identity, read_detector
 from uwbbench.detect.hand_out import with_hand_outs
+from uwbbench.detect.opening import Chosen, background_of, opened
 from uwbbench.detect.sources import source_hash
 from uwbbench.detect.stream import Opened, Stream
 
@@ -27,6 +28,7 @@ _NEEDS = {
     "sts": "STS responses of two antennas",
     "truth": "ground truth",
     "first_path": "reported first path",
+    "background": "background (a recording of its radar with nothing in view)",
 }
 
 
@@ -88,7 +90,7 @@ class Pipeline:
         Parameters
         ----------
         capture : Capture or CaptureHeader
-            Gives the radar; its samples are not touched.
+            Gives the radar; its samples are not touched. A header has no background.
         audit : bool
             Keep what the filters drop, in ``stream.rejected``.
         fused : bool
@@ -108,7 +110,7 @@ class Pipeline:
 
     def _opened(self, capture: CaptureHeader) -> tuple[list[Opened], list[str]]:
         """The stages, opened on the receiver, and what a reader of the results must know of them."""
-        radar = capture.radar
+        radar, background = capture.radar, background_of(capture)
         counted_from_transmission = radar.first_tap_delay_s is not None
         has = {
             name
@@ -116,11 +118,13 @@ class Pipeline:
                 ("sts", radar.has_sts),
                 ("truth", capture.truth is not None),
                 ("first_path", radar.has_first_path or counted_from_transmission),
+                ("background", background is not None),
             )
             if there
         }
         available = {"frames"}
-        stages, notes = [], []
+        chosen: list[Chosen] = []
+        notes: list[str] = []
         missing: dict[str, str] = {}  # port that a step left out would have made: what the capture lacks for it
         left_out: dict[str, list[str]] = {}
         for step in self.config.steps:
@@ -141,14 +145,10 @@ class Pipeline:
             if lacks:
                 where = f"detector '{self.name}', step '{step.label}'"
                 raise ConfigError(f"{where}: capture '{capture.name}' has no {', no '.join(lacks)}")
-            stage: Stage[Any] = cls(cls.params_type().model_validate(params))
-            stage.open(radar)
-            if "truth" in cls.needs and capture.truth is not None:
-                stage.show_truth(capture.truth, capture.trajectory)
-            available = (available - stage.removes) | stage.produces
-            stages.append(Opened(step.label, stage))
+            chosen.append(Chosen(step.label, cls, cls.params_type().model_validate(params)))
+            available = (available - cls.removes) | cls.produces
         notes += [f"left out, as the capture has no {reason}: {', '.join(names)}" for reason, names in left_out.items()]
-        return stages, notes
+        return opened(chosen, capture, background), notes
 
     def run(
         self,
@@ -209,9 +209,9 @@ class Pipeline:
         Block
             Frames without clutter, ``first_path``, ``noise_rms`` and ``profile``, as far as the detector makes them.
         """
-        opened, _ = self._opened(capture)
-        first = next(place for place, step in enumerate(opened) if "detections" in step.stage.produces)
-        stream = Stream(opened[:first], [])
+        steps, _ = self._opened(capture)
+        first = next(place for place, step in enumerate(steps) if "detections" in step.stage.produces)
+        stream = Stream(steps[:first], [])
         for frames in capture.blocks(BATCH_FRAMES):
             yield stream.through(Block(frames.without_invalid()))
         yield from stream.tails()
