@@ -19,6 +19,7 @@ from uwbbench.api.detections import Detections
 from uwbbench.api.errors import UwbbenchError
 from uwbbench.api.registry import AuthoredKind
 from uwbbench.api.stage import Stage
+from uwbbench.api.weights import load_weights
 from uwbbench.tools.check.check import Nonconformity
 from uwbbench.tools.check.inputs import frames_of, pieces, usual_capture
 from uwbbench.tools.check.params import working_params
@@ -64,6 +65,7 @@ class StageSubject(ClassSubject):
             Frames, ascending, before which its background is cut.
         """
         capture = capture or self.capture
+        load_weights(stage, capture.radar)
         stage.open(capture.radar)
         if "truth" in self.cls.needs and capture.truth is not None:
             stage.show_truth(capture.truth, capture.trajectory)
@@ -214,6 +216,7 @@ def _through(name: str, block: Block, made: frozenset[str], capture: Capture) ->
     if lacks_sts or cls.needs & {"truth", "background"} or cls.consumes - made:
         return block, made
     stage: Stage[Any] = cls(working_params(cls.params_type(), {}, f"stage '{name}'", name))
+    load_weights(stage, capture.radar)
     stage.open(capture.radar)
     parts = [stage.step(block)]
     tail = stage.flush()
