@@ -120,9 +120,7 @@ class Limits(Dataset[LimitsParams]):
             license=self.card.license,
             citation=self.card.citation,
             description="Simulated by uwbbench: ideal echoes in filtered noise.",
-            recording=simulated_recording(
-                name, f"limits seed {p.seed}, run {self.names().index(name) + 1} of {p.runs}"
-            ),
+            recording=simulated_recording(name, draws),
             preamble=_responses(range_m, p.frames, 10 ** (p.snr_db / 20), rng),
         )
 
