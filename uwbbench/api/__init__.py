@@ -49,7 +49,7 @@ if TYPE_CHECKING:
     from uwbbench.api.override import with_values
     from uwbbench.api.radar import CHANNEL_CENTER_HZ, Radar
     from uwbbench.api.registry import load_plugin
-    from uwbbench.api.stage import Filter, P, Params, Stage, ports
+    from uwbbench.api.stage import Fidelity, Filter, P, Params, Stage, ports
     from uwbbench.api.term import EchoFading, EchoTail, Paths, Pulse, Responses, SceneObject, Term, View
     from uwbbench.api.trial import StagesOnTrial, exact_ulps
     from uwbbench.api.truth import Obstacle, Sight, Trajectory, Truth
@@ -88,7 +88,7 @@ _HOME = {
     "override": ("with_values",),
     "radar": ("CHANNEL_CENTER_HZ", "Radar"),
     "registry": ("load_plugin",),
-    "stage": ("Filter", "P", "Params", "Stage", "ports"),
+    "stage": ("Fidelity", "Filter", "P", "Params", "Stage", "ports"),
     "term": ("EchoFading", "EchoTail", "Paths", "Pulse", "Responses", "SceneObject", "Term", "View"),
     "trial": ("StagesOnTrial", "exact_ulps"),
     "truth": ("Obstacle", "Sight", "Trajectory", "Truth"),
@@ -116,6 +116,7 @@ __all__ = [
     "EchoTail",
     "Evidence",
     "Example",
+    "Fidelity",
     "Filter",
     "FloatArray",
     "Frames",
