@@ -48,6 +48,7 @@ if TYPE_CHECKING:
     from uwbbench.api.numba_internals import as_tuple
     from uwbbench.api.override import with_values
     from uwbbench.api.radar import CHANNEL_CENTER_HZ, Radar
+    from uwbbench.api.recording import leak_key, leaks, simulated_recording
     from uwbbench.api.registry import load_plugin
     from uwbbench.api.stage import Fidelity, Filter, P, Params, Stage, ports
     from uwbbench.api.term import EchoFading, EchoTail, Paths, Pulse, Responses, SceneObject, Term, View
@@ -87,6 +88,7 @@ _HOME = {
     "numba_internals": ("as_tuple",),
     "override": ("with_values",),
     "radar": ("CHANNEL_CENTER_HZ", "Radar"),
+    "recording": ("leak_key", "leaks", "simulated_recording"),
     "registry": ("load_plugin",),
     "stage": ("Fidelity", "Filter", "P", "Params", "Stage", "ports"),
     "term": ("EchoFading", "EchoTail", "Paths", "Pulse", "Responses", "SceneObject", "Term", "View"),
@@ -167,6 +169,8 @@ __all__ = [
     "find_config",
     "hard_case",
     "inlined",
+    "leak_key",
+    "leaks",
     "list_receivers",
     "load_plugin",
     "magnitude",
@@ -178,6 +182,7 @@ __all__ = [
     "receiver_pose",
     "rotate_z",
     "segments_cross",
+    "simulated_recording",
     "to_world",
     "with_values",
     "wrap_angle",

@@ -25,6 +25,7 @@ from uwbbench.api import (
     Truth,
     View,
     receiver_pose,
+    simulated_recording,
 )
 from uwbbench_datasets.simulator.fidelity import Contribution, choose, described
 from uwbbench_datasets.simulator.scene import Scene
@@ -143,6 +144,8 @@ def _one_receiver(
         source="simulated",
         license="BSD-3-Clause",
         citation="Simulated by uwbbench.",
+        recording=simulated_recording(f"{scene.name}/{run}", f"scene seed {scene.model.seed}, run {run}"),
+        robot=scene.robot_identity,
         preamble=responses.preamble,
         sts1=responses.sts1,
         sts2=responses.sts2,
@@ -192,8 +195,8 @@ def _view(scene: Scene, radar: Radar, trajectory: Trajectory, objects: tuple[Sce
 def _described(scene: Scene, contributions: Mapping[str, Sequence[Contribution]]) -> str:
     """Description for the captures' file: how they were made."""
     about = scene.model.description or scene.name
-    if scene.robot_seed is not None:
-        about += f" Robot {scene.robot or 'without a file'}, seed {scene.robot_seed}."
+    if scene.robot_identity:
+        about += f" Robot {scene.robot_identity}."
     parts = [f"{receiver}: {described(of_terms)}" for receiver, of_terms in contributions.items()]
     return " | ".join([f"Simulated by uwbbench. {about}", *parts])
 

@@ -182,6 +182,11 @@ class Scene:
         robot_named = partial(read_robot, folder=self.folder, place=self.source.place(("robot",)))
         return _scene(self.name, data, self.source, self.folder, robot_named)
 
+    @property
+    def robot_identity(self) -> str:
+        """What tells one robot from others: its name and seed; empty where each run has a robot of its own."""
+        return "" if self.robot_seed is None else f"{self.robot or 'without a file'}, seed {self.robot_seed}"
+
     def radar(self, receiver: str) -> Radar:
         """Radar of one receiver."""
         shared, mount = self.model.radar, self.model.receivers[receiver]
