@@ -51,7 +51,7 @@ if TYPE_CHECKING:
     from uwbbench.api.radar import CHANNEL_CENTER_HZ, Radar
     from uwbbench.api.recording import leak_key, leaks, simulated_recording
     from uwbbench.api.registry import load_plugin
-    from uwbbench.api.stage import Filter, P, Params, Stage, ports
+    from uwbbench.api.stage import Fidelity, Filter, P, Params, Stage, ports
     from uwbbench.api.term import EchoFading, EchoTail, Paths, Pulse, Responses, SceneObject, Term, View
     from uwbbench.api.trial import StagesOnTrial, exact_ulps
     from uwbbench.api.truth import Obstacle, Sight, Trajectory, Truth
@@ -92,7 +92,7 @@ _HOME = {
     "radar": ("CHANNEL_CENTER_HZ", "Radar"),
     "recording": ("leak_key", "leaks", "simulated_recording"),
     "registry": ("load_plugin",),
-    "stage": ("Filter", "P", "Params", "Stage", "ports"),
+    "stage": ("Fidelity", "Filter", "P", "Params", "Stage", "ports"),
     "term": ("EchoFading", "EchoTail", "Paths", "Pulse", "Responses", "SceneObject", "Term", "View"),
     "trial": ("StagesOnTrial", "exact_ulps"),
     "truth": ("Obstacle", "Sight", "Trajectory", "Truth"),
@@ -120,6 +120,7 @@ __all__ = [
     "EchoTail",
     "Evidence",
     "Example",
+    "Fidelity",
     "Filter",
     "FloatArray",
     "Frames",
