@@ -107,8 +107,8 @@ def direct_crest(amplitude: FloatArray, first_path: FloatArray) -> FloatArray:
     crest, tap = height[row, place], np.where(inside, tap, 1)[row, place]
     before, after = amplitude[row, tap - 1], amplitude[row, tap + 1]
     shift = vertex_shift(before, crest, after)
-    steep = (crest > 0) & (before > 0) & (after > 0) & (np.abs(shift) < 0.5)
-    fall = np.log(np.where(steep, before, 1.0)) - np.log(np.where(steep, after, 1.0))
+    bends = (np.minimum(before, after) > 0) & (crest >= np.maximum(before, after))
+    fall = np.log(np.where(bends, before, 1.0)) - np.log(np.where(bends, after, 1.0))
     return np.asarray(crest * np.exp(-fall * shift / 4))
 
 

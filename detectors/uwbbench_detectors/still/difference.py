@@ -28,6 +28,10 @@ from uwbbench_detectors.peaks.interpolation import vertex_shift
 from uwbbench_detectors.still.alignment import DIRECT_TAPS
 
 
+ROUNDING = 64 * np.finfo(float).eps
+"""Share of a mean below which a difference is an error of summation."""
+
+
 class DifferenceParams(Params):
     """Where an obstacle is looked for."""
 
@@ -111,7 +115,8 @@ class Difference(Stage[P]):
     def _found(self, windows: WindowProfile, row: int) -> tuple[float, float] | None:
         """Taps behind the direct crest, and height, of what is found in one window."""
         searched, threshold = self.difference(windows, row)
-        searched = np.where(self._allowed & np.isfinite(searched), searched, -np.inf)
+        more = np.abs(searched) > ROUNDING * self.background.mean  # NaN is not
+        searched = np.where(self._allowed & more, searched, -np.inf)
         above = searched > threshold
         if self.params.peak == "first":
             above = self._first_run(above)

@@ -188,9 +188,7 @@ class Statistic(Stage[StatisticParams]):
         for values, most in ((first_path, self.params.first_path_taps), (power_db, self.params.power_db)):
             near[usable] &= np.abs(values[usable] - np.median(values[usable])) <= most
         if not near[usable].all():
-            self.note(
-                f"{self.name}: frames whose first path or power is far from the median of the window are left out"
-            )
+            self.note(f"{self.name}: frames whose first path or power is far from their window's median are left out")
         return near
 
 
