@@ -43,6 +43,7 @@ if TYPE_CHECKING:
         wrap_angle,
     )
     from uwbbench.api.kernel import Kernel
+    from uwbbench.api.learning import Example, LearnedParams, Trainable, Weights, expect_arrays
     from uwbbench.api.locate import find_config
     from uwbbench.api.metric import Metric, Outcome
     from uwbbench.api.numba_internals import as_tuple
@@ -82,6 +83,7 @@ _HOME = {
         "wrap_angle",
     ),
     "kernel": ("Kernel",),
+    "learning": ("Example", "LearnedParams", "Trainable", "Weights", "expect_arrays"),
     "locate": ("find_config",),
     "metric": ("Metric", "Outcome"),
     "numba_internals": ("as_tuple",),
@@ -117,11 +119,13 @@ __all__ = [
     "EchoFading",
     "EchoTail",
     "Evidence",
+    "Example",
     "Filter",
     "FloatArray",
     "Frames",
     "IntArray",
     "Kernel",
+    "LearnedParams",
     "Limit",
     "LimitFilter",
     "Metric",
@@ -145,11 +149,13 @@ __all__ = [
     "StagesOnTrial",
     "StoreError",
     "Term",
+    "Trainable",
     "Trajectory",
     "Truth",
     "UwbbenchError",
     "View",
     "Violation",
+    "Weights",
     "WindowProfile",
     "YamlFile",
     "analytic",
@@ -161,6 +167,7 @@ __all__ = [
     "compiled",
     "direction",
     "exact_ulps",
+    "expect_arrays",
     "find_config",
     "hard_case",
     "inlined",
