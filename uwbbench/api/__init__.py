@@ -9,6 +9,7 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from uwbbench.api.aligned import AlignedProfile, Bins, WindowProfile
     from uwbbench.api.arrays import BoolArray, ComplexArray, FloatArray, IntArray
     from uwbbench.api.block import Block
     from uwbbench.api.capture import Capture, CaptureHeader, Samples, analytic
@@ -58,6 +59,7 @@ if TYPE_CHECKING:
     from uwbbench.api.yaml_file import YamlFile, read_yaml
 
 _HOME = {
+    "aligned": ("AlignedProfile", "Bins", "WindowProfile"),
     "arrays": ("BoolArray", "ComplexArray", "FloatArray", "IntArray"),
     "block": ("Block",),
     "capture": ("Capture", "CaptureHeader", "Samples", "analytic"),
@@ -104,6 +106,8 @@ __all__ = [
     "CHANNEL_CENTER_HZ",
     "COLUMNS",
     "SPEED_OF_LIGHT_M_S",
+    "AlignedProfile",
+    "Bins",
     "Block",
     "BoolArray",
     "Capture",
@@ -158,6 +162,7 @@ __all__ = [
     "View",
     "Violation",
     "Weights",
+    "WindowProfile",
     "YamlFile",
     "analytic",
     "as_tuple",
