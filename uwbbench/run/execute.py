@@ -24,6 +24,7 @@ from uwbbench.config.detector import DetectorConfig, detector_identity, read_det
 from uwbbench.config.seeds import HIDDEN
 from uwbbench.detect.pipeline import Pipeline
 from uwbbench.detect.results_folder import ResultsFolder
+from uwbbench.measure.accuracy.rules import rules_on
 from uwbbench.measure.accuracy.scoring import ScoringRules
 from uwbbench.measure.latency.machine import machine, usable_cores
 from uwbbench.run import environment
@@ -281,7 +282,7 @@ class _Run:
 
     def _rules(self, dataset: str) -> tuple[ScoringRules, ...]:
         """Rules of the captures of one dataset."""
-        return tuple(rule.of(dataset) for rule in self.rules)
+        return tuple(rules_on(self.rules, dataset))
 
     def _identity(self, unit: Unit, sha256: str) -> str:
         """Identity of a unit on a capture of this content, here and now."""
