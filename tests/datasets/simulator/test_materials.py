@@ -117,3 +117,12 @@ def test_frequency_outside_the_table_is_refused():
 def test_slab_without_thickness_is_refused(thickness_m):
     with pytest.raises(ConfigError, match="thicker than 0 m"):
         reflection("glass", CHANNEL_9_HZ, thickness_m)
+
+
+@pytest.mark.parametrize("frequency_ghz", [3.1, 4.3, 6.4896, 7.9872, 10.5])
+def test_a_person_reflects_like_dry_skin(frequency_ghz):
+    turning = 2j * math.pi * frequency_ghz * 1e9
+    skin = 4 + 32 / (1 + turning * 7.234e-12) + 1100 / (1 + (turning * 32.48e-9) ** 0.8)
+    skin += 0.0002 / (turning * 8.8541878128e-12)
+    expected = (1 - skin**0.5) / (1 + skin**0.5)
+    assert reflection("person", frequency_ghz * 1e9) == pytest.approx(expected, abs=0.005)
