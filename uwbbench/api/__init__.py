@@ -43,7 +43,7 @@ if TYPE_CHECKING:
         wrap_angle,
     )
     from uwbbench.api.kernel import Kernel
-    from uwbbench.api.learning import Example, LearnedParams, Trainable, Weights, expect_arrays
+    from uwbbench.api.learning import Assessed, Example, LearnedParams, Trainable, Weights, expect_arrays
     from uwbbench.api.locate import find_config
     from uwbbench.api.metric import Metric, Outcome
     from uwbbench.api.numba_internals import as_tuple
@@ -85,7 +85,7 @@ _HOME = {
         "wrap_angle",
     ),
     "kernel": ("Kernel",),
-    "learning": ("Example", "LearnedParams", "Trainable", "Weights", "expect_arrays"),
+    "learning": ("Assessed", "Example", "LearnedParams", "Trainable", "Weights", "expect_arrays"),
     "locate": ("find_config",),
     "metric": ("Metric", "Outcome"),
     "numba_internals": ("as_tuple",),
@@ -107,6 +107,7 @@ __all__ = [
     "COLUMNS",
     "SPEED_OF_LIGHT_M_S",
     "AlignedProfile",
+    "Assessed",
     "Bins",
     "Block",
     "BoolArray",
