@@ -35,7 +35,8 @@ def test_datasets_keep_the_detectors_scorings_and_region_of_their_experiment(bot
     one, two = experiment.datasets
     assert (one.label, one.detectors, one.scoring) == ("one", ("constant", "null"), ("frame",))
     assert (two.label, two.detectors, two.scoring) == ("two", ("null",), ("object", "frame"))
-    assert one.region is not None and one.region.min_range_m == 0.8
+    assert one.region is not None
+    assert one.region.min_range_m == 0.8
     assert two.region is None
 
 

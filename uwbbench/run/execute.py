@@ -130,10 +130,17 @@ def _created(experiment: Experiment, todo: Plan, out: Path | None, jobs: int) ->
         **_code(experiment, todo),
         "scenes": todo.scenes,
         "skipped": todo.skipped,
+        **_reported(experiment),
         **({} if experiment.frozen is None else {"frozen": experiment.frozen.contents()}),
         "sessions": [environment.session(jobs)],
     }
     return RunFolder.create(out, manifest)
+
+
+def _reported(experiment: Experiment) -> dict[str, Any]:
+    """What sources report of the detectors, where they do."""
+    figures = {one.name: [each.model_dump() for each in one.reported] for one in experiment.detectors if one.reported}
+    return {"reported": figures} if figures else {}
 
 
 def _code(experiment: Experiment, todo: Plan) -> dict[str, Any]:
