@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 _NOTE = (
     "Reported by source: of other radars, other scenes and mostly another metric, as named; no target, and no "
-    "validation of what is here. Detectors after such sources are reconstructions, unless their fidelity says otherwise."
+    "validation of what is here. Such detectors are reconstructions, unless their fidelity says otherwise."
 )
 
 
