@@ -9,6 +9,7 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from uwbbench.api.aligned import AlignedProfile, Bins, WindowProfile
     from uwbbench.api.arrays import BoolArray, ComplexArray, FloatArray, IntArray
     from uwbbench.api.block import Block
     from uwbbench.api.capture import Capture, CaptureHeader, Samples, analytic
@@ -46,6 +47,7 @@ if TYPE_CHECKING:
     from uwbbench.api.locate import find_config
     from uwbbench.api.metric import Metric, Outcome
     from uwbbench.api.numba_internals import as_tuple
+    from uwbbench.api.outcomes import TrackOutcome
     from uwbbench.api.override import with_values
     from uwbbench.api.radar import CHANNEL_CENTER_HZ, Radar
     from uwbbench.api.recording import leak_key, leaks, simulated_recording
@@ -57,6 +59,7 @@ if TYPE_CHECKING:
     from uwbbench.api.yaml_file import YamlFile, read_yaml
 
 _HOME = {
+    "aligned": ("AlignedProfile", "Bins", "WindowProfile"),
     "arrays": ("BoolArray", "ComplexArray", "FloatArray", "IntArray"),
     "block": ("Block",),
     "capture": ("Capture", "CaptureHeader", "Samples", "analytic"),
@@ -86,6 +89,7 @@ _HOME = {
     "locate": ("find_config",),
     "metric": ("Metric", "Outcome"),
     "numba_internals": ("as_tuple",),
+    "outcomes": ("TrackOutcome",),
     "override": ("with_values",),
     "radar": ("CHANNEL_CENTER_HZ", "Radar"),
     "recording": ("leak_key", "leaks", "simulated_recording"),
@@ -102,7 +106,9 @@ __all__ = [
     "CHANNEL_CENTER_HZ",
     "COLUMNS",
     "SPEED_OF_LIGHT_M_S",
+    "AlignedProfile",
     "Assessed",
+    "Bins",
     "Block",
     "BoolArray",
     "Capture",
@@ -149,6 +155,7 @@ __all__ = [
     "StagesOnTrial",
     "StoreError",
     "Term",
+    "TrackOutcome",
     "Trainable",
     "Trajectory",
     "Truth",
@@ -156,6 +163,7 @@ __all__ = [
     "View",
     "Violation",
     "Weights",
+    "WindowProfile",
     "YamlFile",
     "analytic",
     "as_tuple",

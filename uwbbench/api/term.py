@@ -260,12 +260,16 @@ class Term(Generic[P]):
         True where the term models the robot itself: a robot's file may then give its parameters, and in a scene that
         names a robot the draws of ``prepare`` follow from the robot's seed, the receiver and the channel, so that they
         are the same in all runs and scenes. What ``paths``, ``apply`` and ``record`` draw is drawn anew in each run.
+    of_place : bool
+        True where the draws of ``prepare`` make the surroundings, such as what stands on the walls. A run and its
+        background share them, as they share the robot; all else is drawn anew for a background.
     fidelity : str
         Where the model comes from, as of a stage.
     """
 
     shared: ClassVar[bool] = False
     of_robot: ClassVar[bool] = False
+    of_place: ClassVar[bool] = False
     fidelity: ClassVar[Fidelity] = "baseline"
 
     def __init__(self, params: P) -> None:

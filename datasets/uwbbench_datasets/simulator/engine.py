@@ -37,6 +37,9 @@ BLOCK = 1024
 _NO_RUN = 0
 """In the place of a run's number, which counts from 1, in the streams of what belongs to the robot."""
 
+_BACKGROUND = zlib.crc32(b"background")
+"""Before the number of the run in the streams of its background, whose noise, grid and gain are others."""
+
 _HEIGHTS = 2**18
 """Values of pulses and sums held at a time, which bounds the memory."""
 
@@ -55,7 +58,7 @@ class _Part:
     name: str
     term: Term[Any]
     of_run: _Stream
-    of_prepare: _Stream  # the robot's, where what is drawn once belongs to it
+    of_prepare: _Stream  # the robot's or the place's, where what is drawn once belongs to it
     seconds: float = 0.0
     pulses: int = 0
 
@@ -92,7 +95,7 @@ class Simulation:
         }
 
 
-def simulate(scene: Scene, run: int = 1, *, threads: int = 1) -> Simulation:
+def simulate(scene: Scene, run: int = 1, *, background: bool = False, threads: int = 1) -> Simulation:
     """Simulate one run of a scene.
 
     Parameters
@@ -100,6 +103,9 @@ def simulate(scene: Scene, run: int = 1, *, threads: int = 1) -> Simulation:
     scene : Scene
     run : int
         Number of the run, from 1; each has its own draws.
+    background : bool
+        Give each capture a background: the same run of the same robot at the same place, with walls and other structure
+        and without the objects, and with noise, grid and gain of its own.
     threads : int
         Blocks worked on at a time. The result does not depend on it.
 
@@ -114,6 +120,12 @@ def simulate(scene: Scene, run: int = 1, *, threads: int = 1) -> Simulation:
     captures, contributions = [], {}
     for receiver in scene.model.receivers:
         capture, of_terms = _one_receiver(scene, run, receiver, trajectory, objects, threads)
+        if background:
+            structure = tuple(body for body in objects if body.structure)
+            empty, _ = _one_receiver(scene, run, receiver, trajectory, structure, threads, background=True)
+            said = f"Simulated by uwbbench. {capture.name} without its objects, with noise of its own."
+            named = replace(empty, name=f"{empty.name} background", description=said)
+            capture = replace(capture, background=named)
         captures.append(capture)
         contributions[receiver] = of_terms
     text = _described(scene, contributions)
@@ -121,9 +133,16 @@ def simulate(scene: Scene, run: int = 1, *, threads: int = 1) -> Simulation:
 
 
 def _one_receiver(
-    scene: Scene, run: int, receiver: str, trajectory: Trajectory, objects: tuple[SceneObject, ...], threads: int
+    scene: Scene,
+    run: int,
+    receiver: str,
+    trajectory: Trajectory,
+    objects: tuple[SceneObject, ...],
+    threads: int,
+    *,
+    background: bool = False,
 ) -> tuple[Capture, tuple[Contribution, ...]]:
-    parts = [_part(scene, run, receiver, index) for index in range(len(scene.terms))]
+    parts = [_part(scene, run, receiver, index, background=background) for index in range(len(scene.terms))]
     view = _view(scene, scene.radar(receiver), trajectory, objects)
     for part in [part for part in parts if part.has("prepare")]:
         started = time.perf_counter()
@@ -156,11 +175,14 @@ def _one_receiver(
     return capture, contributions
 
 
-def _part(scene: Scene, run: int, receiver: str, index: int) -> _Part:
+def _part(scene: Scene, run: int, receiver: str, index: int, *, background: bool) -> _Part:
     use, term, params = scene.terms[index]
     owner = "" if term.shared else receiver
     key = (zlib.crc32(owner.encode()), zlib.crc32(use.name.encode()))
     of_run = of_prepare = _Stream(scene.model.seed, (run, *key))
+    if background:
+        of_run = _Stream(scene.model.seed, (_BACKGROUND, run, *key))
+        of_prepare = of_prepare if term.of_robot or term.of_place else of_run
     if term.of_robot and scene.robot_seed is not None:
         of_prepare = _Stream(scene.robot_seed, (_NO_RUN, scene.model.radar.channel, *key))
     return _Part(use.name, term(params), of_run, of_prepare)
