@@ -29,6 +29,7 @@ from uwbbench.api import (
 )
 from uwbbench_datasets.simulator.fidelity import Contribution, choose, described
 from uwbbench_datasets.simulator.scene import Scene
+from uwbbench_datasets.simulator.shapes import ObjectModel
 from uwbbench_datasets.simulator.trajectory import sampled
 
 BLOCK = 1024
@@ -116,7 +117,7 @@ def simulate(scene: Scene, run: int = 1, *, background: bool = False, threads: i
     """
     scene = scene.of_run(run)
     trajectory = sampled(scene.model.trajectory, scene.model.radar.frame_rate_hz, scene.folder)
-    objects = tuple(item.body() for item in scene.model.objects)
+    objects = tuple(item.moving(trajectory.timestamp_s, _motion(scene, run, item)) for item in scene.model.objects)
     captures, contributions = [], {}
     for receiver in scene.model.receivers:
         capture, of_terms = _one_receiver(scene, run, receiver, trajectory, objects, threads)
@@ -130,6 +131,12 @@ def simulate(scene: Scene, run: int = 1, *, background: bool = False, threads: i
         contributions[receiver] = of_terms
     text = _described(scene, contributions)
     return Simulation(tuple(replace(capture, description=text) for capture in captures), contributions)
+
+
+def _motion(scene: Scene, run: int, item: ObjectModel) -> np.random.Generator:
+    """Random stream of one object's motion in a run, the same for all receivers."""
+    key = (run, zlib.crc32(b"motion"), zlib.crc32(item.id.encode()))
+    return np.random.Generator(np.random.SFC64(np.random.SeedSequence(scene.model.seed, spawn_key=key)))
 
 
 def _one_receiver(
