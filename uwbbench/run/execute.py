@@ -37,6 +37,7 @@ from uwbbench.run.folder.scored import rules_of, table_of, with_metrics
 from uwbbench.run.hard_cases import examined
 from uwbbench.run.hard_cases import failed as unexamined
 from uwbbench.run.hard_cases import identity_of as identity_of_cases
+from uwbbench.run.leaks import refuse_trained_on
 from uwbbench.run.plan import Plan, Unit, plan, reason_of
 from uwbbench.run.unit import Finished, Job, content_of, entry_of, run_unit
 
@@ -103,6 +104,8 @@ def run_experiment(
 
     Raises
     ------
+    ConfigError
+        If a detector was trained on captures of the experiment.
     StoreError
         If results cannot be written, or the folder holds another experiment.
     Interrupted
@@ -110,6 +113,8 @@ def run_experiment(
     """
     workers = usable_cores() if jobs is None else max(1, jobs)
     todo = plan(experiment)
+    refs = {(unit.dataset, unit.ref.name): unit.ref for unit in todo.units}
+    refuse_trained_on(experiment.runnable, ((f"{label}: {name}", ref) for (label, name), ref in refs.items()))
     made = _resumed if resume else _created
     folder = made(experiment, todo, out, workers)
     try:
