@@ -31,6 +31,7 @@ EXPECTED = {
     "background-mean",
     "background-ema",
     "background-svd",
+    "entropy",
     "null",
     "constant",
     "oracle",
