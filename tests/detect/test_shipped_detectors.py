@@ -243,6 +243,7 @@ def rail(data_dir):
     return dataset.open(dataset.names()[0])
 
 
+@pytest.mark.slow
 @pytest.mark.data
 @pytest.mark.parametrize(
     ("name", "changes"),
@@ -264,6 +265,7 @@ def test_two_strongest_detections_find_the_reflectors_of_the_measured_rail(name,
     assert filtering.chance_recall < 0.25
 
 
+@pytest.mark.slow
 @pytest.mark.data
 @pytest.mark.parametrize(
     ("name", "least_tree", "least_walk"),

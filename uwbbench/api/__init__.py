@@ -42,6 +42,7 @@ if TYPE_CHECKING:
         wrap_angle,
     )
     from uwbbench.api.kernel import Kernel
+    from uwbbench.api.learning import Example, LearnedParams, Trainable, Weights, expect_arrays
     from uwbbench.api.locate import find_config
     from uwbbench.api.metric import Metric, Outcome
     from uwbbench.api.numba_internals import as_tuple
@@ -80,6 +81,7 @@ _HOME = {
         "wrap_angle",
     ),
     "kernel": ("Kernel",),
+    "learning": ("Example", "LearnedParams", "Trainable", "Weights", "expect_arrays"),
     "locate": ("find_config",),
     "metric": ("Metric", "Outcome"),
     "numba_internals": ("as_tuple",),
@@ -113,11 +115,13 @@ __all__ = [
     "EchoFading",
     "EchoTail",
     "Evidence",
+    "Example",
     "Filter",
     "FloatArray",
     "Frames",
     "IntArray",
     "Kernel",
+    "LearnedParams",
     "Limit",
     "LimitFilter",
     "Metric",
@@ -141,11 +145,13 @@ __all__ = [
     "StagesOnTrial",
     "StoreError",
     "Term",
+    "Trainable",
     "Trajectory",
     "Truth",
     "UwbbenchError",
     "View",
     "Violation",
+    "Weights",
     "YamlFile",
     "analytic",
     "as_tuple",
@@ -156,6 +162,7 @@ __all__ = [
     "compiled",
     "direction",
     "exact_ulps",
+    "expect_arrays",
     "find_config",
     "hard_case",
     "inlined",

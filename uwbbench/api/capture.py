@@ -133,6 +133,9 @@ class Capture(CaptureHeader):
     odometry_position_m, odometry_yaw_rad : array or None
     receivers : tuple of str
         All receivers in the file this capture came from.
+    background : Capture or None
+        What the same radar on the same robot recorded with nothing in view, with noise of its own. Shown to stages that
+        need a ``background``.
     """
 
     preamble: Samples
@@ -144,6 +147,7 @@ class Capture(CaptureHeader):
     odometry_position_m: FloatArray | None = None
     odometry_yaw_rad: FloatArray | None = None
     receivers: tuple[str, ...] = field(default=())
+    background: Capture | None = None
 
     def __post_init__(self) -> None:
         lock_fields(self, ("preamble", "sts1", "sts2", *PER_FRAME))
@@ -185,6 +189,20 @@ class Capture(CaptureHeader):
             raise CaptureError(
                 f"capture '{self.name}': timestamp_s must be finite and not decrease; frame {bad} breaks that"
             )
+        if self.background is not None:
+            self._check_background(self.background)
+
+    def _check_background(self, background: Capture) -> None:
+        """Refuse what is no background of this capture's radar."""
+        pair = f"capture '{self.name}': '{background.name}' cannot be its background"
+        if background.background is not None:
+            raise CaptureError(f"{pair}: it has a background itself")
+        if not len(background):
+            raise CaptureError(f"{pair}: it has no frames")
+        differing = self.radar.differences(background.radar)
+        if differing:
+            values = ", ".join(f"{name} {theirs!r} instead of {own!r}" for name, (own, theirs) in differing.items())
+            raise CaptureError(f"{pair}: it is of another radar, with {values}")
 
     @property
     def header(self) -> CaptureHeader:
@@ -254,7 +272,7 @@ class Capture(CaptureHeader):
 
     @cached_property
     def sha256(self) -> str:
-        """Hash of the content: radar, poses, truth and samples, whatever file they came from."""
+        """Hash of the content: radar, poses, truth, samples and background, whatever file they came from."""
         digest = hashlib.sha256(json.dumps(self.radar.to_dict(), sort_keys=True).encode())
         track = self.trajectory
         arrays: list[Samples | None] = [track.timestamp_s, track.position_m, track.yaw_rad]
@@ -269,4 +287,6 @@ class Capture(CaptureHeader):
             for start in range(0, 0 if array is None else array.shape[0], 65536):
                 assert array is not None  # noqa: S101
                 digest.update(np.ascontiguousarray(array[start : start + 65536]).tobytes())
+        if self.background is not None:  # without one, the hash is that of earlier versions
+            digest.update(f"background {self.background.sha256}".encode())
         return digest.hexdigest()

@@ -35,6 +35,7 @@ def at(candidates, capture, threshold):
     return int(outcome.tp.sum()), int(outcome.fp.sum())
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=80)
 @given(
     rows=st.lists(
