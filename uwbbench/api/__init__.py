@@ -46,6 +46,7 @@ if TYPE_CHECKING:
     from uwbbench.api.locate import find_config
     from uwbbench.api.metric import Metric, Outcome
     from uwbbench.api.numba_internals import as_tuple
+    from uwbbench.api.outcomes import TrackOutcome
     from uwbbench.api.override import with_values
     from uwbbench.api.radar import CHANNEL_CENTER_HZ, Radar
     from uwbbench.api.registry import load_plugin
@@ -85,6 +86,7 @@ _HOME = {
     "locate": ("find_config",),
     "metric": ("Metric", "Outcome"),
     "numba_internals": ("as_tuple",),
+    "outcomes": ("TrackOutcome",),
     "override": ("with_values",),
     "radar": ("CHANNEL_CENTER_HZ", "Radar"),
     "registry": ("load_plugin",),
@@ -145,6 +147,7 @@ __all__ = [
     "StagesOnTrial",
     "StoreError",
     "Term",
+    "TrackOutcome",
     "Trainable",
     "Trajectory",
     "Truth",

@@ -54,7 +54,10 @@ from uwbbench.measure.accuracy.echoes import (
     ghosts_m,
     window_m,
 )
-from uwbbench.measure.accuracy.judge import Scene, ScoringRules, Verdict, judge
+from uwbbench.measure.accuracy.judge import judge
+from uwbbench.measure.accuracy.rules import ScoringRules
+from uwbbench.measure.accuracy.scene import Scene
+from uwbbench.measure.accuracy.verdict import Verdict
 
 NOT_KNOWN = "not known"
 DROPPED = "dropped by "
