@@ -42,9 +42,7 @@ def test_numbers_that_a_file_has_rounded_are_the_same_radar():
 )
 def test_a_background_of_another_radar_is_refused_with_what_differs(name, value, said):
     capture = capture_of()
-    with pytest.raises(
-        CaptureError, match=f"'empty' cannot be its background: it is of another radar.*{said}"
-    ):
+    with pytest.raises(CaptureError, match=f"'empty' cannot be its background: it is of another radar.*{said}"):
         dataclasses.replace(capture, background=background_of(capture, **{name: value}))
 
 

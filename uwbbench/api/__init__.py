@@ -46,7 +46,7 @@ if TYPE_CHECKING:
     from uwbbench.api.locate import find_config
     from uwbbench.api.metric import Metric, Outcome
     from uwbbench.api.numba_internals import as_tuple
-    from uwbbench.api.outcomes import TrackOutcome
+    from uwbbench.api.outcomes import PresenceOutcome, SegmentOutcome, TrackOutcome
     from uwbbench.api.override import with_values
     from uwbbench.api.radar import CHANNEL_CENTER_HZ, Radar
     from uwbbench.api.registry import load_plugin
@@ -86,7 +86,7 @@ _HOME = {
     "locate": ("find_config",),
     "metric": ("Metric", "Outcome"),
     "numba_internals": ("as_tuple",),
-    "outcomes": ("TrackOutcome",),
+    "outcomes": ("PresenceOutcome", "SegmentOutcome", "TrackOutcome"),
     "override": ("with_values",),
     "radar": ("CHANNEL_CENTER_HZ", "Radar"),
     "registry": ("load_plugin",),
@@ -134,6 +134,7 @@ __all__ = [
     "Params",
     "Paths",
     "PluginError",
+    "PresenceOutcome",
     "Pulse",
     "Radar",
     "RankFilter",
@@ -142,6 +143,7 @@ __all__ = [
     "Samples",
     "SceneObject",
     "ScoringError",
+    "SegmentOutcome",
     "Sight",
     "Stage",
     "StagesOnTrial",
