@@ -77,6 +77,11 @@ class CaptureHeader:
         None where there is no ground truth: the capture can be detected on, timed and plotted, not scored.
     source : {"measured", "simulated"}
     license, citation, description : str
+    recording : str
+        What the capture is of, the same for all receivers of a run: captures of one recording leak into each other
+        (:mod:`uwbbench.api.recording`). The name without its receiver if left out.
+    robot : str
+        Identity of the robot, whose ringing is in every frame; empty where it is not known.
     """
 
     name: str
@@ -87,6 +92,13 @@ class CaptureHeader:
     license: str = "unknown"
     citation: str = ""
     description: str = ""
+    recording: str = ""
+    robot: str = ""
+
+    def __post_init__(self) -> None:
+        if not self.recording:
+            named = self.name.removesuffix(f"/{self.radar.receiver}")
+            object.__setattr__(self, "recording", named)
 
     def __len__(self) -> int:
         return len(self.trajectory)
@@ -150,6 +162,7 @@ class Capture(CaptureHeader):
     background: Capture | None = None
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         lock_fields(self, ("preamble", "sts1", "sts2", *PER_FRAME))
         if len(self.preamble.shape) != 2:
             raise CaptureError(f"capture '{self.name}': samples have shape (frames, taps), not {self.preamble.shape}")
@@ -203,6 +216,8 @@ class Capture(CaptureHeader):
         if differing:
             values = ", ".join(f"{name} {theirs!r} instead of {own!r}" for name, (own, theirs) in differing.items())
             raise CaptureError(f"{pair}: it is of another radar, with {values}")
+        if self.robot and background.robot and self.robot != background.robot:
+            raise CaptureError(f"{pair}: it is of another robot, '{background.robot}' instead of '{self.robot}'")
 
     @property
     def header(self) -> CaptureHeader:

@@ -241,7 +241,8 @@ def check_detector(data: Mapping[str, Any], source: YamlFile) -> DetectorConfig:
 def _check_score(score: str | None, steps: list[Step], source: YamlFile) -> None:
     """Check that a step makes the column that orders candidates."""
     made = {port for step in steps for port in registry.load_plugin("stages", step.use).produces}
-    columns = sorted(made - {"first_path", "noise", "profile", "detections", "cluster"})
+    parts = {"first_path", "noise", "profile", "aligned", "window_mean", "window_sd", "detections", "cluster"}
+    columns = sorted(made - parts)
     if score is not None and score not in columns:
         known = f"{nearest(score, columns)} They make: {', '.join(columns) or 'no column'}"
         raise ConfigError(f"{source.place(('score',))}: no step makes the column '{score}'.{known}")

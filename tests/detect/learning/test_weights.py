@@ -74,7 +74,7 @@ def about(approach, **changes: Any) -> About:
         "source": "",
         "radars": (sampling_of(approach.radar),),
         "captures": (
-            LearnedFrom(role="training", dataset="d", capture="c", sha256="0" * 64, recording="c", keys=("c",)),
+            LearnedFrom(role="training", dataset="d", capture="c", sha256="0" * 64, recording="c"),
         ),
         "seed": 0,
         "versions": {},

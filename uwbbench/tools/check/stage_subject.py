@@ -26,7 +26,14 @@ from uwbbench.tools.check.params import working_params
 from uwbbench.tools.check.subject import ClassSubject
 from uwbbench.tools.check.values import Values, of_blocks
 
-PARTS = {"first_path": "first_path", "noise": "noise_rms", "profile": "profile"}
+PARTS = {
+    "first_path": "first_path",
+    "noise": "noise_rms",
+    "profile": "profile",
+    "aligned": "aligned",
+    "window_mean": "window_mean",
+    "window_sd": "window_sd",
+}
 """Attribute of a block behind each port that is one."""
 
 
@@ -111,7 +118,10 @@ class StageSubject(ClassSubject):
         """Arrays of the usual block."""
         block = self.block
         arrays = {f"frames.{name}": value for name, value in vars(block.frames).items()}
-        arrays |= {name: getattr(block, name) for name in PARTS.values()}
+        for name in PARTS.values():
+            part = getattr(block, name)
+            plain = part is None or isinstance(part, np.ndarray)
+            arrays |= {name: part} if plain else {f"{name}.{key}": value for key, value in vars(part).items()}
         arrays |= {f"detections.{name}": column for name, column in block.detections.columns.items()}
         return {name: value for name, value in arrays.items() if isinstance(value, np.ndarray)}
 
