@@ -9,13 +9,17 @@ from typing import Any, get_args
 
 from uwbbench.api.errors import ScoringError, nearest
 from uwbbench.api.metric import Metric, Outcome
-from uwbbench.api.outcomes import TrackOutcome
+from uwbbench.api.outcomes import PresenceOutcome, SegmentOutcome, TrackOutcome
 from uwbbench.config.rules import Scoring, Surface
 from uwbbench.measure.accuracy.region import Region
 
 SCORINGS: tuple[Scoring, ...] = get_args(Scoring)
 
-_OUTCOMES: Mapping[str, type[Outcome]] = {"track": TrackOutcome}
+_OUTCOMES: Mapping[str, type[Outcome]] = {
+    "track": TrackOutcome,
+    "segment": SegmentOutcome,
+    "presence": PresenceOutcome,
+}
 
 
 def outcome_of(scoring: str) -> type[Outcome]:
@@ -34,7 +38,7 @@ class ScoringRules:
 
     Parameters
     ----------
-    scoring : {"frame", "peak", "object", "latest", "track"}
+    scoring : {"frame", "peak", "object", "latest", "track", "segment", "presence"}
     gate_m : float
         Largest error of a true detection, inclusive.
     region : Region
@@ -68,7 +72,7 @@ class ScoringRules:
     @property
     def one_to_one(self) -> bool:
         """Whether every object in a frame is one chance, matched with at most one row, and structure is set aside."""
-        return self.scoring in ("object", "track")
+        return self.scoring in ("object", "track", "segment")
 
     def to_dict(self) -> dict[str, Any]:
         """Rules as plain values; what is of single datasets only where there is any, as earlier versions had none."""

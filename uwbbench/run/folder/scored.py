@@ -97,7 +97,7 @@ def with_causes(
     ----------
     rows : iterable of mapping
         Of :func:`score_rows`; those that are not scored stay as they are, and so do those by the latest answer, whose
-        errors may be those of another frame.
+        errors may be those of another frame, or of presence, which has none.
     detections : Detections
         With their candidates; without them the causes of misses are not known.
     scene : Scene
@@ -108,7 +108,7 @@ def with_causes(
     by_name = {rule.scoring: rule for rule in rules}
     completed = [dict(row) for row in rows]
     for row in completed:
-        if row["status"] == "scored" and row["scoring"] != "latest":
+        if row["status"] == "scored" and row["scoring"] not in ("latest", "presence"):
             row[CAUSES] = canonical(causes(detections, scene, by_name[row["scoring"]], row["table"]).to_dict())
     return completed
 
