@@ -140,8 +140,15 @@ class Scene:
     unprocessed: int
 
     @classmethod
-    def of(cls, detections: Detections, header: CaptureHeader) -> Scene:
+    def of(cls, detections: Detections, header: CaptureHeader, sight: Sight | None = None) -> Scene:
         """Scene of a capture for a detector's output.
+
+        Parameters
+        ----------
+        detections : Detections
+        header : CaptureHeader
+        sight : Sight, optional
+            Of the capture's objects, where it is known from another detector's output.
 
         Raises
         ------
@@ -160,7 +167,7 @@ class Scene:
                 )
         if len(detections) and "range_m" not in detections:
             raise ScoringError("the detections have no range_m; add the stage 'range' to the detector")
-        sight = truth.seen_from(header.radar, header.trajectory)
+        sight = sight or truth.seen_from(header.radar, header.trajectory)
         labelled = np.isfinite(sight.range_m) & np.isfinite(sight.azimuth_rad)
         obstacle = np.array([not item.structure for item in truth.objects], bool)
         known = labelled.all(axis=1) if truth.exhaustive else (labelled & obstacle).any(axis=1)
