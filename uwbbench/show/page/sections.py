@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from uwbbench.results.verdicts import INTERVALS
+from uwbbench.results.verdicts import BOUNDS, INTERVALS
 from uwbbench.show.page import answer, error_sections, limits_section
 from uwbbench.show.page.limits_section import limits
 from uwbbench.show.page.section import Section
@@ -59,6 +59,7 @@ def leaderboard(content: Content) -> Section | None:
         "\u201cof matches\u201d counts true positives only: read it with recall. n/a: undefined. Times of a frame are "
         f"{content.report.timed}; absolute ones hold on one machine only, the ratio travels.",
     )
+    notes += (BOUNDS,) if content.report.bounds else ()
     return Section("leaderboard", "Leaderboard", layout="leaderboard", notes=notes)
 
 
