@@ -27,6 +27,7 @@ from uwbbench.api.errors import StoreError
 from uwbbench.config.detector import from_results, marked
 from uwbbench.measure.accuracy.counts import reach_of_mean
 from uwbbench.measure.accuracy.metrics.choice import MetricChoice
+from uwbbench.measure.accuracy.scoring import column_of
 from uwbbench.measure.accuracy.stats import Estimate
 from uwbbench.results import published
 from uwbbench.results.chains import chains_of
@@ -42,7 +43,6 @@ from uwbbench.results.verdicts import Ranks, ranks_of
 from uwbbench.run.folder.folder import RunFolder
 from uwbbench.run.folder.journal import Entry
 from uwbbench.run.folder.reported import REPORTED_FACT
-from uwbbench.run.folder.scored import column_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -99,7 +99,7 @@ class Report:
         self.detectors: list[str] = [config["name"] for config in self.experiment["detectors"]]
         self.read_only: set[str] = {one["name"] for one in self.experiment["detectors"] if from_results(one)}
         self.bounds = folder.bounds
-        self.metrics = MetricChoice(self.experiment["metrics"])
+        self.metrics = MetricChoice(self.experiment["metrics"], [rule.scoring for rule in folder.rules])
         self.settings: dict[str, Any] = {**self.experiment["intervals"], "seed": self.experiment["seed"]}
 
     @cached_property
@@ -136,14 +136,18 @@ class Report:
             board[0]: {name: s.ratio for (at, name), s in speeds.items() if at == board[0]} for board in self.boards
         }
         return {
-            board: ranks_of(members, self.metrics, self._estimates[board], times[board[0]], bounds=self.bounds)
+            board: ranks_of(
+                members, self.metrics.of(board[2]), self._estimates[board], times[board[0]], bounds=self.bounds
+            )
             for board, members in self.boards.items()
         }
 
     @cached_property
     def _estimates(self) -> dict[Board, dict[str, dict[str, Estimate]]]:
         return {
-            board: {name: estimates_of(self.metrics, scored, self.settings) for name, scored in members.items()}
+            board: {
+                name: estimates_of(self.metrics.of(board[2]), scored, self.settings) for name, scored in members.items()
+            }
             for board, members in self.boards.items()
         }
 
@@ -245,7 +249,7 @@ class Report:
         }
         for _, members in sorted(groups.items(), key=lambda item: item[0]):
             first, same = members[0], tuple(map(id, members))
-            estimates = known[same] if same in known else estimates_of(self.metrics, members, self.settings)
+            estimates = known.get(same) or estimates_of(self.metrics.of(first.scoring), members, self.settings)
             keys = ("table", "scoring", "detector", "dataset", "channel", "material", "source")
             row = {key: getattr(first, key) for key in keys} | {"captures": len(members)}
             row["frames"] = sum(len(one.outcome.group) for one in members)
