@@ -210,7 +210,9 @@ def _numbers(table: NumberTable, name: str) -> FloatArray:
     whole = (values == np.floor(values)) & (values >= -1)
     if not whole.all():
         row = int(np.argmin(whole))
-        raise ScoringError(f"{table.place(row)}: {name} {values[row]:g}: expected a whole number from 0, or -1 for none")
+        raise ScoringError(
+            f"{table.place(row)}: {name} {values[row]:g}: expected a whole number from 0, or -1 for none"
+        )
     return values
 
 
