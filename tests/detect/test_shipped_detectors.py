@@ -41,6 +41,7 @@ EXPECTED = {
     "background-mean",
     "background-ema",
     "background-svd",
+    "entropy",
     "null",
     "constant",
     "oracle",

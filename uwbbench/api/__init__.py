@@ -43,11 +43,11 @@ if TYPE_CHECKING:
         wrap_angle,
     )
     from uwbbench.api.kernel import Kernel
-    from uwbbench.api.learning import Example, LearnedParams, Trainable, Weights, expect_arrays
+    from uwbbench.api.learning import Assessed, Example, LearnedParams, Trainable, Weights, expect_arrays
     from uwbbench.api.locate import find_config
     from uwbbench.api.metric import Metric, Outcome
     from uwbbench.api.numba_internals import as_tuple
-    from uwbbench.api.outcomes import TrackOutcome
+    from uwbbench.api.outcomes import PresenceOutcome, SegmentOutcome, TrackOutcome
     from uwbbench.api.override import with_values
     from uwbbench.api.radar import CHANNEL_CENTER_HZ, Radar
     from uwbbench.api.recording import leak_key, leaks, simulated_recording
@@ -85,11 +85,11 @@ _HOME = {
         "wrap_angle",
     ),
     "kernel": ("Kernel",),
-    "learning": ("Example", "LearnedParams", "Trainable", "Weights", "expect_arrays"),
+    "learning": ("Assessed", "Example", "LearnedParams", "Trainable", "Weights", "expect_arrays"),
     "locate": ("find_config",),
     "metric": ("Metric", "Outcome"),
     "numba_internals": ("as_tuple",),
-    "outcomes": ("TrackOutcome",),
+    "outcomes": ("PresenceOutcome", "SegmentOutcome", "TrackOutcome"),
     "override": ("with_values",),
     "radar": ("CHANNEL_CENTER_HZ", "Radar"),
     "recording": ("leak_key", "leaks", "simulated_recording"),
@@ -107,6 +107,7 @@ __all__ = [
     "COLUMNS",
     "SPEED_OF_LIGHT_M_S",
     "AlignedProfile",
+    "Assessed",
     "Bins",
     "Block",
     "BoolArray",
@@ -141,6 +142,7 @@ __all__ = [
     "Params",
     "Paths",
     "PluginError",
+    "PresenceOutcome",
     "Pulse",
     "Radar",
     "RankFilter",
@@ -149,6 +151,7 @@ __all__ = [
     "Samples",
     "SceneObject",
     "ScoringError",
+    "SegmentOutcome",
     "Sight",
     "Stage",
     "StagesOnTrial",

@@ -79,6 +79,14 @@ class Trainable(Protocol):
         """
 
 
+@runtime_checkable
+class Assessed(Protocol):
+    """A stage that says how well it answers, in the measures that it learns by; no stage need do so."""
+
+    def assess(self, examples: Iterable[Example]) -> Mapping[str, float]:
+        """Figures by name over all examples together; called when the stage has its weights and is open."""
+
+
 class LearnedParams(Params):
     """Parameters of a stage that learns.
 

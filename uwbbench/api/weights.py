@@ -44,7 +44,6 @@ class LearnedFrom(_Fact):
     capture: str
     sha256: str
     recording: str
-    keys: tuple[str, ...] = Field(description="By each of which a capture that shares it is recognised.")
 
 
 class StepBefore(_Fact):

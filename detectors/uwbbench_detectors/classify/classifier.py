@@ -111,6 +111,24 @@ class Classifier(Stage[C]):
                 raise ConfigError(f"no frame of the class '{name}' is among the examples: nothing tells it from others")
         return self.learn(features, label, seed)
 
+    def assess(self, examples: Iterable[Example]) -> dict[str, float]:
+        """Accuracy over all classes, and balanced accuracy of presence: the mean of its two rates.
+
+        Parameters
+        ----------
+        examples : iterable of Example
+            A class of which there is no frame does not count.
+        """
+        features, label = self.labelled(examples)
+        found = self.probabilities(features)
+        present, answer = label > 0, found[:, 0] <= 0.5
+        rates = [np.mean(answer[side] == present[side]) for side in (present, ~present) if side.any()]
+        return {
+            "frames": float(len(label)),
+            "accuracy": float(np.mean(found.argmax(axis=1) == label)),
+            "presence": float(np.mean(rates)),
+        }
+
     def labelled(self, examples: Iterable[Example]) -> tuple[NDArray[np.float32], IntArray]:
         """Features (frames, 93) of all frames that have any, and the number of their class.
 

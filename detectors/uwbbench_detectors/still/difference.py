@@ -27,7 +27,6 @@ from uwbbench.api import (
 from uwbbench_detectors.peaks.interpolation import vertex_shift
 from uwbbench_detectors.still.alignment import DIRECT_TAPS
 
-
 ROUNDING = 64 * np.finfo(float).eps
 """Share of a mean below which a difference is an error of summation."""
 
