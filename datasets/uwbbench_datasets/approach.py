@@ -29,6 +29,7 @@ from uwbbench.api import (
     Trajectory,
     Truth,
     nearest,
+    simulated_recording,
 )
 
 SAMPLE_INTERVAL_S = 1 / (2 * 499.2e6)
@@ -122,6 +123,7 @@ class Approach(Dataset[ApproachParams]):
             license=self.card.license,
             citation=self.card.citation,
             description="Simulated by uwbbench: one plate, straight approach.",
+            recording=simulated_recording(name, f"approach seed {p.seed}, run {names.index(name) + 1}"),
             preamble=responses[0],
             sts1=responses[1] if p.sts else None,
             sts2=responses[2] if p.sts else None,

@@ -24,6 +24,7 @@ from uwbbench.api import (
     Trajectory,
     Truth,
     nearest,
+    simulated_recording,
 )
 from uwbbench_datasets.simulator.pulses import RaisedCosinePulse
 
@@ -92,7 +93,9 @@ class Limits(Dataset[LimitsParams]):
         if name not in self.names():
             raise CaptureError(f"no test signal '{name}'.{nearest(name, self.names())}")
         p = self.params
-        rng = np.random.default_rng(p.seed if p.runs == 1 else [p.seed, self.names().index(name)])
+        run = self.names().index(name)
+        rng = np.random.default_rng(p.seed if p.runs == 1 else [p.seed, run])
+        draws = f"limits seed {p.seed}" if p.runs == 1 else f"limits seed {p.seed}, run {run + 1}"
         range_m = self._ranges(rng)
         obstacles = tuple(
             Obstacle(f"echo {index + 1}", "ideal", np.stack([one, np.zeros_like(one)], axis=1)[:, None, :])
@@ -117,6 +120,7 @@ class Limits(Dataset[LimitsParams]):
             license=self.card.license,
             citation=self.card.citation,
             description="Simulated by uwbbench: ideal echoes in filtered noise.",
+            recording=simulated_recording(name, draws),
             preamble=_responses(range_m, p.frames, 10 ** (p.snr_db / 20), rng),
         )
 

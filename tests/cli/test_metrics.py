@@ -12,6 +12,8 @@ import pytest
 from uwbbench.results import Report
 from uwbbench.run.folder import RunFolder
 
+pytestmark = pytest.mark.slow
+
 METRIC = '''\
 """A metric of another package."""
 

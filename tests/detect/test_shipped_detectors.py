@@ -14,10 +14,20 @@ from tests.fixtures.chance import seed
 from uwbbench import load_detector
 from uwbbench.api import Capture, ConfigError, Detections
 from uwbbench.api.locate import shipped
+from uwbbench.api.registry import load_plugin
 from uwbbench.config.source import open_dataset
 from uwbbench.measure.accuracy.scoring import Region, score
 
 NAMES = sorted(shipped("detectors"))
+# Those that need a recording of the empty scene are tested on captures that have one.
+ON_A_PLATE = [
+    name
+    for name in NAMES
+    if not any(
+        "background" in load_plugin("stages", step.use).needs and not step.optional
+        for step in load_detector(name).config.steps
+    )
+]
 FRAMES = 150
 EXPECTED = {
     "paper",
@@ -70,7 +80,7 @@ def test_every_detector_says_what_it_is(name):
 
 
 @pytest.mark.parametrize("sts", [True, False])
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", ON_A_PLATE)
 def test_every_detector_runs_and_looks_at_every_frame(name, sts):
     found = whole_run(name, sts)
     np.testing.assert_array_equal(found.processed, np.arange(FRAMES))
@@ -78,7 +88,7 @@ def test_every_detector_runs_and_looks_at_every_frame(name, sts):
 
 
 @pytest.mark.parametrize("sts", [True, False])
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", ON_A_PLATE)
 @given(cuts=st.lists(st.integers(0, FRAMES), max_size=12))
 @example(cuts=list(range(1, FRAMES)))
 @settings(max_examples=3, deadline=None)
@@ -242,6 +252,7 @@ def rail(data_dir):
     return dataset.open(dataset.names()[0])
 
 
+@pytest.mark.slow
 @pytest.mark.data
 @pytest.mark.parametrize(
     ("name", "changes"),
@@ -263,6 +274,7 @@ def test_two_strongest_detections_find_the_reflectors_of_the_measured_rail(name,
     assert filtering.chance_recall < 0.25
 
 
+@pytest.mark.slow
 @pytest.mark.data
 @pytest.mark.parametrize(
     ("name", "least_tree", "least_walk"),

@@ -188,6 +188,7 @@ def test_extra_metrics_are_columns(run: Run) -> None:
     assert "bias (cm)" in sheets(report)[0].columns
 
 
+@pytest.mark.slow
 def test_latency_is_shown_as_of_this_machine_only(run: Run) -> None:
     report = Report(run("['null']", scoring="frame", latency="{reference: 'null', frames: 40}"))
     row = report.latency.iloc[0]

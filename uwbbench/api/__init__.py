@@ -9,6 +9,7 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from uwbbench.api.aligned import AlignedProfile, Bins, WindowProfile
     from uwbbench.api.arrays import BoolArray, ComplexArray, FloatArray, IntArray
     from uwbbench.api.block import Block
     from uwbbench.api.capture import Capture, CaptureHeader, Samples, analytic
@@ -42,19 +43,23 @@ if TYPE_CHECKING:
         wrap_angle,
     )
     from uwbbench.api.kernel import Kernel
+    from uwbbench.api.learning import Assessed, Example, LearnedParams, Trainable, Weights, expect_arrays
     from uwbbench.api.locate import find_config
     from uwbbench.api.metric import Metric, Outcome
     from uwbbench.api.numba_internals import as_tuple
+    from uwbbench.api.outcomes import TrackOutcome
     from uwbbench.api.override import with_values
     from uwbbench.api.radar import CHANNEL_CENTER_HZ, Radar
+    from uwbbench.api.recording import leak_key, leaks, simulated_recording
     from uwbbench.api.registry import load_plugin
-    from uwbbench.api.stage import Filter, P, Params, Stage, ports
+    from uwbbench.api.stage import Fidelity, Filter, P, Params, Stage, ports
     from uwbbench.api.term import EchoFading, EchoTail, Paths, Pulse, Responses, SceneObject, Term, View
     from uwbbench.api.trial import StagesOnTrial, exact_ulps
     from uwbbench.api.truth import Obstacle, Sight, Trajectory, Truth
     from uwbbench.api.yaml_file import YamlFile, read_yaml
 
 _HOME = {
+    "aligned": ("AlignedProfile", "Bins", "WindowProfile"),
     "arrays": ("BoolArray", "ComplexArray", "FloatArray", "IntArray"),
     "block": ("Block",),
     "capture": ("Capture", "CaptureHeader", "Samples", "analytic"),
@@ -80,13 +85,16 @@ _HOME = {
         "wrap_angle",
     ),
     "kernel": ("Kernel",),
+    "learning": ("Assessed", "Example", "LearnedParams", "Trainable", "Weights", "expect_arrays"),
     "locate": ("find_config",),
     "metric": ("Metric", "Outcome"),
     "numba_internals": ("as_tuple",),
+    "outcomes": ("TrackOutcome",),
     "override": ("with_values",),
     "radar": ("CHANNEL_CENTER_HZ", "Radar"),
+    "recording": ("leak_key", "leaks", "simulated_recording"),
     "registry": ("load_plugin",),
-    "stage": ("Filter", "P", "Params", "Stage", "ports"),
+    "stage": ("Fidelity", "Filter", "P", "Params", "Stage", "ports"),
     "term": ("EchoFading", "EchoTail", "Paths", "Pulse", "Responses", "SceneObject", "Term", "View"),
     "trial": ("StagesOnTrial", "exact_ulps"),
     "truth": ("Obstacle", "Sight", "Trajectory", "Truth"),
@@ -98,6 +106,9 @@ __all__ = [
     "CHANNEL_CENTER_HZ",
     "COLUMNS",
     "SPEED_OF_LIGHT_M_S",
+    "AlignedProfile",
+    "Assessed",
+    "Bins",
     "Block",
     "BoolArray",
     "Capture",
@@ -113,11 +124,14 @@ __all__ = [
     "EchoFading",
     "EchoTail",
     "Evidence",
+    "Example",
+    "Fidelity",
     "Filter",
     "FloatArray",
     "Frames",
     "IntArray",
     "Kernel",
+    "LearnedParams",
     "Limit",
     "LimitFilter",
     "Metric",
@@ -141,11 +155,15 @@ __all__ = [
     "StagesOnTrial",
     "StoreError",
     "Term",
+    "TrackOutcome",
+    "Trainable",
     "Trajectory",
     "Truth",
     "UwbbenchError",
     "View",
     "Violation",
+    "Weights",
+    "WindowProfile",
     "YamlFile",
     "analytic",
     "as_tuple",
@@ -156,9 +174,12 @@ __all__ = [
     "compiled",
     "direction",
     "exact_ulps",
+    "expect_arrays",
     "find_config",
     "hard_case",
     "inlined",
+    "leak_key",
+    "leaks",
     "list_receivers",
     "load_plugin",
     "magnitude",
@@ -170,6 +191,7 @@ __all__ = [
     "receiver_pose",
     "rotate_z",
     "segments_cross",
+    "simulated_recording",
     "to_world",
     "with_values",
     "wrap_angle",

@@ -77,6 +77,11 @@ class CaptureHeader:
         None where there is no ground truth: the capture can be detected on, timed and plotted, not scored.
     source : {"measured", "simulated"}
     license, citation, description : str
+    recording : str
+        What the capture is of, the same for all receivers of a run: captures of one recording leak into each other
+        (:mod:`uwbbench.api.recording`). The name without its receiver if left out.
+    robot : str
+        Identity of the robot, whose ringing is in every frame; empty where it is not known.
     """
 
     name: str
@@ -87,6 +92,13 @@ class CaptureHeader:
     license: str = "unknown"
     citation: str = ""
     description: str = ""
+    recording: str = ""
+    robot: str = ""
+
+    def __post_init__(self) -> None:
+        if not self.recording:
+            named = self.name.removesuffix(f"/{self.radar.receiver}")
+            object.__setattr__(self, "recording", named)
 
     def __len__(self) -> int:
         return len(self.trajectory)
@@ -133,6 +145,9 @@ class Capture(CaptureHeader):
     odometry_position_m, odometry_yaw_rad : array or None
     receivers : tuple of str
         All receivers in the file this capture came from.
+    background : Capture or None
+        What the same radar on the same robot recorded with nothing in view, with noise of its own. Shown to stages that
+        need a ``background``.
     """
 
     preamble: Samples
@@ -144,8 +159,10 @@ class Capture(CaptureHeader):
     odometry_position_m: FloatArray | None = None
     odometry_yaw_rad: FloatArray | None = None
     receivers: tuple[str, ...] = field(default=())
+    background: Capture | None = None
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         lock_fields(self, ("preamble", "sts1", "sts2", *PER_FRAME))
         if len(self.preamble.shape) != 2:
             raise CaptureError(f"capture '{self.name}': samples have shape (frames, taps), not {self.preamble.shape}")
@@ -185,6 +202,22 @@ class Capture(CaptureHeader):
             raise CaptureError(
                 f"capture '{self.name}': timestamp_s must be finite and not decrease; frame {bad} breaks that"
             )
+        if self.background is not None:
+            self._check_background(self.background)
+
+    def _check_background(self, background: Capture) -> None:
+        """Refuse what is no background of this capture's radar."""
+        pair = f"capture '{self.name}': '{background.name}' cannot be its background"
+        if background.background is not None:
+            raise CaptureError(f"{pair}: it has a background itself")
+        if not len(background):
+            raise CaptureError(f"{pair}: it has no frames")
+        differing = self.radar.differences(background.radar)
+        if differing:
+            values = ", ".join(f"{name} {theirs!r} instead of {own!r}" for name, (own, theirs) in differing.items())
+            raise CaptureError(f"{pair}: it is of another radar, with {values}")
+        if self.robot and background.robot and self.robot != background.robot:
+            raise CaptureError(f"{pair}: it is of another robot, '{background.robot}' instead of '{self.robot}'")
 
     @property
     def header(self) -> CaptureHeader:
@@ -254,7 +287,7 @@ class Capture(CaptureHeader):
 
     @cached_property
     def sha256(self) -> str:
-        """Hash of the content: radar, poses, truth and samples, whatever file they came from."""
+        """Hash of the content: radar, poses, truth, samples and background, whatever file they came from."""
         digest = hashlib.sha256(json.dumps(self.radar.to_dict(), sort_keys=True).encode())
         track = self.trajectory
         arrays: list[Samples | None] = [track.timestamp_s, track.position_m, track.yaw_rad]
@@ -269,4 +302,6 @@ class Capture(CaptureHeader):
             for start in range(0, 0 if array is None else array.shape[0], 65536):
                 assert array is not None  # noqa: S101
                 digest.update(np.ascontiguousarray(array[start : start + 65536]).tobytes())
+        if self.background is not None:  # without one, the hash is that of earlier versions
+            digest.update(f"background {self.background.sha256}".encode())
         return digest.hexdigest()

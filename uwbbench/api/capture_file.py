@@ -31,6 +31,8 @@ _DAMAGE = (OSError, RuntimeError, KeyError, ValueError, TypeError)
 _POSITIVE = ("center_frequency_hz", "bandwidth_hz", "sample_interval_s", "frame_rate_hz")
 _RADAR = ("model", *_POSITIVE, "samples", "channel")
 _RECEIVER_OPTIONAL = ("array_spacing_m", "first_tap_delay_s")
+_TEXTS = ("citation", "description", "recording", "robot")
+"""Texts about a capture that need not be there."""
 _TRACKS = ("first_path_index", "first_path_index_sts1", "first_path_index_sts2", "odometry_yaw_rad")
 
 
@@ -228,7 +230,7 @@ def _read(reader: _Reader, receiver: str, receivers: tuple[str, ...]) -> Capture
     assert timestamp_s is not None  # noqa: S101
     if np.any(~np.isfinite(timestamp_s)) or np.any(np.diff(timestamp_s) < 0):
         raise reader.fail(f"{base}/timestamp_s", "expected finite times that do not decrease")
-    tracks = {name: reader.track(f"{base}/{name}", shape[:1]) for name in _TRACKS}
+    tracks: dict[str, Any] = {name: reader.track(f"{base}/{name}", shape[:1]) for name in _TRACKS}
     position_m = reader.track(f"{base}/position_m", (shape[0], 3))
     yaw_rad = reader.track(f"{base}/yaw_rad", shape[:1])
     optional = {name: reader.attribute(base, name, float, None) for name in _RECEIVER_OPTIONAL}
@@ -254,8 +256,7 @@ def _read(reader: _Reader, receiver: str, receivers: tuple[str, ...]) -> Capture
         name=reader.attribute("/", "name", str),
         source="measured" if source == "measured" else "simulated",
         license=reader.attribute("/", "license", str),
-        citation=reader.attribute("/", "citation", str, ""),
-        description=reader.attribute("/", "description", str, ""),
+        **{name: reader.attribute("/", name, str, "") for name in _TEXTS},
         radar=radar,
         trajectory=Trajectory(
             timestamp_s,
@@ -340,6 +341,7 @@ def _check_belong_together(target: Path, captures: Sequence[Capture]) -> None:
         differing = [name for name in _RADAR if getattr(other.radar, name) != getattr(first.radar, name)]
         if _stored(first.truth) != _stored(other.truth):
             differing.append("truth")
+        differing += [name for name in ("recording", "robot") if getattr(other, name) != getattr(first, name)]
         if differing:
             names = f"'{first.radar.receiver}' and '{other.radar.receiver}'"
             raise CaptureError(f"{target}: receivers {names} are not of one run: they differ in {', '.join(differing)}")
@@ -358,7 +360,7 @@ def _write(file: h5py.File, captures: Sequence[Capture]) -> None:
     moves = first.truth is not None and any(obstacle.moves for obstacle in first.truth.objects)
     file.attrs.update({"format": FORMAT, "format_version": "1.1" if moves else "1.0", "name": first.name})
     file.attrs.update({"source": first.source, "license": first.license})
-    file.attrs.update({name: text for name in ("citation", "description") if (text := getattr(first, name))})
+    file.attrs.update({name: text for name in _TEXTS if (text := getattr(first, name))})
     radar = file.create_group("radar")
     radar.attrs.update({name: value for name in _RADAR if (value := getattr(first.radar, name)) is not None})
     for capture in captures:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Literal
@@ -118,6 +119,27 @@ class Radar:
         flown = delay_s * SPEED_OF_LIGHT_M_S
         return flown - self.baseline_length_m if self.first_tap_delay_s is not None else flown
 
+    def differences(self, other: Radar) -> dict[str, tuple[Any, Any]]:
+        """What makes another radar's frames no frames of this one, by name: this one's value, and the other's.
+
+        The frame rate is no part of it: one radar may be run at several. Numbers that a file has rounded are equal.
+        """
+        pairs = {
+            item.name: (getattr(self, item.name), getattr(other, item.name))
+            for item in dataclasses.fields(self)
+            if item.name != "frame_rate_hz"
+        }
+        return {name: pair for name, pair in pairs.items() if not _alike(*pair)}
+
     def to_dict(self) -> dict[str, Any]:
         """Plain values, for JSON."""
         return dataclasses.asdict(self)
+
+
+def _alike(one: Any, other: Any) -> bool:
+    """Whether two values of a field are the same up to rounding."""
+    if isinstance(one, tuple) and isinstance(other, tuple):
+        return len(one) == len(other) and all(map(_alike, one, other))
+    if isinstance(one, float) and isinstance(other, float | int):
+        return math.isclose(one, other, rel_tol=1e-6, abs_tol=1e-15)
+    return bool(one == other)

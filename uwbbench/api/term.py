@@ -81,8 +81,8 @@ class SceneObject:
         Name, material and outline, as in the ground truth.
     shape : str
         ``plate``, ``box``, ``rod``, ``wall``, ``person`` or ``point``.
-    center_m : (3,) array
-        Centre of the body in the world.
+    center_m : (3,) or (frames, 3) array
+        Centre of the body in the world; with a frame axis it moves, and so does its outline.
     yaw_rad : float
         Heading of its front: the outward normal of a plate's or wall's front face.
     width_m, depth_m, height_m : float
@@ -127,6 +127,13 @@ class SceneObject:
     def structure(self) -> bool:
         """Whether it is a wall or the like, which no detector is asked to find."""
         return self.obstacle.structure
+
+    def part(self, start: int, stop: int) -> SceneObject:
+        """The object in frames ``start`` to ``stop``."""
+        if not self.obstacle.moves:
+            return self
+        obstacle = dataclasses.replace(self.obstacle, outline_m=self.obstacle.outline_m[start:stop])
+        return dataclasses.replace(self, obstacle=obstacle, center_m=self.center_m[start:stop])
 
 
 @dataclass(frozen=True)
@@ -220,7 +227,9 @@ class View:
     def part(self, start: int, stop: int) -> View:
         """Frames ``start`` to ``stop`` of this view."""
         names = ("timestamp_s", "receiver_m", "transmitter_m", "boresight_rad", "visibility", "crest_tap")
-        return self.replace(first=self.first + start, **{name: getattr(self, name)[start:stop] for name in names})
+        parts: dict[str, Any] = {name: getattr(self, name)[start:stop] for name in names}
+        objects = tuple(body.part(start, stop) for body in self.objects)
+        return self.replace(first=self.first + start, objects=objects, **parts)
 
     def azimuth_rad(self, points_m: FloatArray) -> FloatArray:
         """Azimuth (frames, n) from boresight of world points (frames or 1, n, 3)."""
@@ -260,12 +269,16 @@ class Term(Generic[P]):
         True where the term models the robot itself: a robot's file may then give its parameters, and in a scene that
         names a robot the draws of ``prepare`` follow from the robot's seed, the receiver and the channel, so that they
         are the same in all runs and scenes. What ``paths``, ``apply`` and ``record`` draw is drawn anew in each run.
+    of_place : bool
+        True where the draws of ``prepare`` make the surroundings, such as what stands on the walls. A run and its
+        background share them, as they share the robot; all else is drawn anew for a background.
     fidelity : str
         Where the model comes from, as of a stage.
     """
 
     shared: ClassVar[bool] = False
     of_robot: ClassVar[bool] = False
+    of_place: ClassVar[bool] = False
     fidelity: ClassVar[Fidelity] = "baseline"
 
     def __init__(self, params: P) -> None:

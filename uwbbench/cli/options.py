@@ -18,6 +18,7 @@ class Scoring(StrEnum):
     PEAK = "peak"
     OBJECT = "object"
     LATEST = "latest"
+    TRACK = "track"
 
 
 class Surface(StrEnum):

@@ -18,6 +18,7 @@ from uwbbench.api.locate import find_config
 from uwbbench.api.override import with_values
 from uwbbench.api.yaml_file import YamlFile, parse_yaml, read_yaml
 from uwbbench.config.extends import extended
+from uwbbench.config.weights import anchored_weights, portable_weights
 
 BY_CHANNEL = "by_channel"
 """Key of a parameter whose value depends on the capture's channel: ``{by_channel: {5: 1.0, 9: 0.2, other: 0.2}}``."""
@@ -131,6 +132,10 @@ class DetectorConfig:
 
     def to_dict(self) -> dict[str, Any]:
         """Resolved file as plain values: what a manifest stores and an identity is made of."""
+        return portable_weights(self.here())
+
+    def here(self) -> dict[str, Any]:
+        """Resolved file as plain values that another process on this machine can read, files that it names included."""
         steps = [{"use": s.use, "as": s.label, "params": s.params, "optional": s.optional} for s in self.steps]
         score = {"score": self.score} if self.score else {}
         return {"schema": 1, "name": self.name, "fidelity": self.fidelity, **score, "pipeline": steps}
@@ -199,16 +204,16 @@ def read_detector(
     """
     path = find_config("detectors", name, relative_to)
     source = read_yaml(path)
-    data = extended(source, "detectors", path)
+    data = anchored_weights(extended(source, "detectors", path, anchored_weights), path.parent)
     if changes:
-        data = with_values(data, changes, "--set")
+        data = anchored_weights(with_values(data, changes, "--set"), relative_to or Path())
     return check_detector(data, source)
 
 
 def detector_from_text(text: str, name: str = "detector") -> DetectorConfig:
     """Detector from YAML text, as :func:`read_detector` does from a file."""
     source = parse_yaml(text, name)
-    return check_detector(extended(source, "detectors"), source)
+    return check_detector(anchored_weights(extended(source, "detectors", None, anchored_weights), Path()), source)
 
 
 def check_detector(data: Mapping[str, Any], source: YamlFile) -> DetectorConfig:
@@ -236,7 +241,8 @@ def check_detector(data: Mapping[str, Any], source: YamlFile) -> DetectorConfig:
 def _check_score(score: str | None, steps: list[Step], source: YamlFile) -> None:
     """Check that a step makes the column that orders candidates."""
     made = {port for step in steps for port in registry.load_plugin("stages", step.use).produces}
-    columns = sorted(made - {"first_path", "noise", "profile", "detections", "cluster"})
+    parts = {"first_path", "noise", "profile", "aligned", "window_mean", "window_sd", "detections", "cluster"}
+    columns = sorted(made - parts)
     if score is not None and score not in columns:
         known = f"{nearest(score, columns)} They make: {', '.join(columns) or 'no column'}"
         raise ConfigError(f"{source.place(('score',))}: no step makes the column '{score}'.{known}")

@@ -20,8 +20,8 @@ import numpy as np
 from uwbbench.api.arrays import BoolArray, FloatArray, IntArray
 from uwbbench.api.capture import CaptureHeader
 from uwbbench.api.detections import Detections
-from uwbbench.measure.accuracy.judge import Scene
 from uwbbench.measure.accuracy.metrics.choice import MetricChoice
+from uwbbench.measure.accuracy.scene import Scene
 from uwbbench.measure.accuracy.scoring import ScoringRules
 from uwbbench.measure.accuracy.stats import evaluate
 from uwbbench.results.ground_truth import Outline, TrueRange, outlines, true_ranges
@@ -128,6 +128,7 @@ def cases(
             if (one.dataset, one.source, one.detector) == (dataset, source, leader)
             and (one.scoring, one.table) == (rule.scoring, "filtering")
         ]
+        metrics = metrics.of(rule.scoring)
         names = [metrics.ranking(exhaustive=one.outcome.exhaustive) for one in chosen]
         rows = [
             (name, evaluate(metrics[name], [one.outcome]), one.capture) for name, one in zip(names, chosen, strict=True)

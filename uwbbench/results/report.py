@@ -97,7 +97,7 @@ class Report:
         self.entries: list[Entry] = folder.entries()
         self.detectors: list[str] = [config["name"] for config in self.experiment["detectors"]]
         self.read_only: set[str] = {one["name"] for one in self.experiment["detectors"] if from_results(one)}
-        self.metrics = MetricChoice(self.experiment["metrics"])
+        self.metrics = MetricChoice(self.experiment["metrics"], [rule.scoring for rule in folder.rules])
         self.settings: dict[str, Any] = {**self.experiment["intervals"], "seed": self.experiment["seed"]}
 
     @cached_property
@@ -134,14 +134,16 @@ class Report:
             board[0]: {name: s.ratio for (at, name), s in speeds.items() if at == board[0]} for board in self.boards
         }
         return {
-            board: ranks_of(members, self.metrics, self._estimates[board], times[board[0]])
+            board: ranks_of(members, self.metrics.of(board[2]), self._estimates[board], times[board[0]])
             for board, members in self.boards.items()
         }
 
     @cached_property
     def _estimates(self) -> dict[Board, dict[str, dict[str, Estimate]]]:
         return {
-            board: {name: estimates_of(self.metrics, scored, self.settings) for name, scored in members.items()}
+            board: {
+                name: estimates_of(self.metrics.of(board[2]), scored, self.settings) for name, scored in members.items()
+            }
             for board, members in self.boards.items()
         }
 
@@ -232,7 +234,8 @@ class Report:
             row = {key: getattr(first, key) for key in keys} | {"captures": len(members)}
             row["frames"] = sum(len(one.outcome.group) for one in members)
             row["errors"] = errors_in(one.outcome for one in members)
-            rows.append(row | _columns(estimates_of(self.metrics, members, self.settings)) | self._reach(members))
+            estimates = estimates_of(self.metrics.of(first.scoring), members, self.settings)
+            rows.append(row | _columns(estimates) | self._reach(members))
         return pd.DataFrame(rows)
 
     def _reach(self, members: Sequence[Scored]) -> dict[str, float]:

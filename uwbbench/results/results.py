@@ -13,12 +13,12 @@ from uwbbench.api.arrays import FloatArray
 from uwbbench.api.capture import CaptureHeader
 from uwbbench.api.errors import ScoringError, StoreError
 from uwbbench.api.metric import Outcome
-from uwbbench.measure.accuracy.judge import Scene, judge
+from uwbbench.measure.accuracy.judge import judge, tables_of
 from uwbbench.measure.accuracy.metrics.choice import MetricChoice
-from uwbbench.measure.accuracy.scoring import ScoringRules, tables_of
+from uwbbench.measure.accuracy.scene import Scene
+from uwbbench.measure.accuracy.scoring import ScoringRules, column_of
 from uwbbench.measure.accuracy.stats import Estimate, estimated
 from uwbbench.run.folder.folder import RunFolder
-from uwbbench.run.folder.scored import column_of
 
 
 @dataclass(frozen=True)
@@ -89,7 +89,8 @@ def _scored(folder: RunFolder, rows: Mapping[Any, Any], rules: Sequence[ScoringR
             continue
         for rule in (one.of(entry.dataset) for one in rules):
             try:
-                tables = {name: judge(detections, scene, rule, name).outcome for name in tables_of(detections)}
+                names = tables_of(detections, rule.scoring)
+                tables = {name: judge(detections, scene, rule, name).outcome for name in names}
             except ScoringError:
                 continue
             for name, outcome in tables.items():

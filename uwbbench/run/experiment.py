@@ -23,6 +23,7 @@ from uwbbench.config.model import ConfigModel, DetectorName
 from uwbbench.config.rules import GateRadius, IntervalModel, MetricsUse, RegionModel, Scoring, Strongest, Surface
 from uwbbench.config.seeds import Seeds, read_seeds
 from uwbbench.config.source import data_roots
+from uwbbench.measure.accuracy.metrics.choice import check_applies, load_metric
 from uwbbench.measure.latency.settings import LatencyModel
 from uwbbench.run.folder.scored import rules_of
 from uwbbench.run.suite import WHOLE, Frozen, SuitePart, read_frozen
@@ -323,7 +324,8 @@ def _metrics(model: ExperimentModel, source: YamlFile) -> tuple[str, ...] | dict
         places += [(name, ("charts", at)) for at, name in enumerate(chosen.charts or ())]
     for name, at in places:
         with placed(source, ("metrics", *at)):
-            metric = registry.load_plugin("metrics", name)
+            metric = load_metric(name)
+            check_applies(name, metric, model.scoring)
             if at == ("rank",) and metric.better == "zero":
                 raise ConfigError(f"metric '{name}' has no better end, so it cannot rank")
     if isinstance(model.metrics, list):

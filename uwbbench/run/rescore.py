@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from uwbbench.measure.accuracy.judge import Scene
+from uwbbench.measure.accuracy.scene import Scene
 from uwbbench.measure.accuracy.scoring import ScoringRules
 from uwbbench.run.folder.folder import RunFolder
 from uwbbench.run.folder.journal import Entry

@@ -176,6 +176,7 @@ class Et4173Walk(Dataset[Et4173WalkParams]):
             + ("range by the device's own count" if offset_m is None else f"bin 0 at {offset_m:g} m as given")
             + "; when the person passes the corners is FITTED ON THE SCORED OBJECT.",
             preamble=samples.astype(np.float32),
+            recording=self.card.folder,
             receivers=tuple(self.nodes_m),
         )
 

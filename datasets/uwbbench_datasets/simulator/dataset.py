@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
-from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any, ClassVar
@@ -23,6 +21,9 @@ class SimulatedParams(Params):
     set: dict[str, Any] = Field(default_factory=dict, description="Values to change in each scene, by path.")
     seed: int | None = Field(None, ge=0, description="Of all draws; as the scene says if left out.")
     runs: int | None = Field(None, ge=1, le=10_000, description="Runs of each variant; as the scene says if left out.")
+    background: bool = Field(
+        False, description="Each capture comes with a background: the same run without its objects, noise drawn anew."
+    )
 
 
 class Simulated(Dataset[SimulatedParams]):
@@ -68,8 +69,7 @@ class Simulated(Dataset[SimulatedParams]):
         """The scene with the dataset's seed, from which each scene and variant draws otherwise."""
         if self.params.seed is None:
             return scene
-        number = hashlib.sha256(f"{self.params.seed} {scene.name}".encode()).digest()[:16]
-        return replace(scene, model=scene.model.model_copy(update={"seed": int.from_bytes(number)}))
+        return scene.seeded(self.params.seed)
 
     def runs(self) -> list[str]:
         """Names of the runs, each of which holds all receivers: ``scene/variant/run``."""
@@ -86,7 +86,7 @@ class Simulated(Dataset[SimulatedParams]):
         if run not in self._runs:
             raise CaptureError(f"no simulated run '{run}'.{nearest(run, self._runs)}")
         scene, number = self._runs[run]
-        return simulate(scene, number, threads=threads)
+        return simulate(scene, number, background=self.params.background, threads=threads)
 
     def names(self) -> list[str]:
         """One capture for each receiver of each run."""

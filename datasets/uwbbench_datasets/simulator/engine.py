@@ -25,9 +25,11 @@ from uwbbench.api import (
     Truth,
     View,
     receiver_pose,
+    simulated_recording,
 )
 from uwbbench_datasets.simulator.fidelity import Contribution, choose, described
 from uwbbench_datasets.simulator.scene import Scene
+from uwbbench_datasets.simulator.shapes import ObjectModel
 from uwbbench_datasets.simulator.trajectory import sampled
 
 BLOCK = 1024
@@ -35,6 +37,9 @@ BLOCK = 1024
 
 _NO_RUN = 0
 """In the place of a run's number, which counts from 1, in the streams of what belongs to the robot."""
+
+_BACKGROUND = zlib.crc32(b"background")
+"""Before the number of the run in the streams of its background, whose noise, grid and gain are others."""
 
 _HEIGHTS = 2**18
 """Values of pulses and sums held at a time, which bounds the memory."""
@@ -54,7 +59,7 @@ class _Part:
     name: str
     term: Term[Any]
     of_run: _Stream
-    of_prepare: _Stream  # the robot's, where what is drawn once belongs to it
+    of_prepare: _Stream  # the robot's or the place's, where what is drawn once belongs to it
     seconds: float = 0.0
     pulses: int = 0
 
@@ -91,7 +96,7 @@ class Simulation:
         }
 
 
-def simulate(scene: Scene, run: int = 1, *, threads: int = 1) -> Simulation:
+def simulate(scene: Scene, run: int = 1, *, background: bool = False, threads: int = 1) -> Simulation:
     """Simulate one run of a scene.
 
     Parameters
@@ -99,6 +104,9 @@ def simulate(scene: Scene, run: int = 1, *, threads: int = 1) -> Simulation:
     scene : Scene
     run : int
         Number of the run, from 1; each has its own draws.
+    background : bool
+        Give each capture a background: the same run of the same robot at the same place, with walls and other structure
+        and without the objects, and with noise, grid and gain of its own.
     threads : int
         Blocks worked on at a time. The result does not depend on it.
 
@@ -109,20 +117,39 @@ def simulate(scene: Scene, run: int = 1, *, threads: int = 1) -> Simulation:
     """
     scene = scene.of_run(run)
     trajectory = sampled(scene.model.trajectory, scene.model.radar.frame_rate_hz, scene.folder)
-    objects = tuple(item.body() for item in scene.model.objects)
+    objects = tuple(item.moving(trajectory.timestamp_s, _motion(scene, run, item)) for item in scene.model.objects)
     captures, contributions = [], {}
     for receiver in scene.model.receivers:
         capture, of_terms = _one_receiver(scene, run, receiver, trajectory, objects, threads)
+        if background:
+            structure = tuple(body for body in objects if body.structure)
+            empty, _ = _one_receiver(scene, run, receiver, trajectory, structure, threads, background=True)
+            said = f"Simulated by uwbbench. {capture.name} without its objects, with noise of its own."
+            named = replace(empty, name=f"{empty.name} background", description=said)
+            capture = replace(capture, background=named)
         captures.append(capture)
         contributions[receiver] = of_terms
     text = _described(scene, contributions)
     return Simulation(tuple(replace(capture, description=text) for capture in captures), contributions)
 
 
+def _motion(scene: Scene, run: int, item: ObjectModel) -> np.random.Generator:
+    """Random stream of one object's motion in a run, the same for all receivers."""
+    key = (run, zlib.crc32(b"motion"), zlib.crc32(item.id.encode()))
+    return np.random.Generator(np.random.SFC64(np.random.SeedSequence(scene.model.seed, spawn_key=key)))
+
+
 def _one_receiver(
-    scene: Scene, run: int, receiver: str, trajectory: Trajectory, objects: tuple[SceneObject, ...], threads: int
+    scene: Scene,
+    run: int,
+    receiver: str,
+    trajectory: Trajectory,
+    objects: tuple[SceneObject, ...],
+    threads: int,
+    *,
+    background: bool = False,
 ) -> tuple[Capture, tuple[Contribution, ...]]:
-    parts = [_part(scene, run, receiver, index) for index in range(len(scene.terms))]
+    parts = [_part(scene, run, receiver, index, background=background) for index in range(len(scene.terms))]
     view = _view(scene, scene.radar(receiver), trajectory, objects)
     for part in [part for part in parts if part.has("prepare")]:
         started = time.perf_counter()
@@ -143,6 +170,8 @@ def _one_receiver(
         source="simulated",
         license="BSD-3-Clause",
         citation="Simulated by uwbbench.",
+        recording=simulated_recording(f"{scene.name}/{run}", f"scene seed {scene.model.seed}, run {run}"),
+        robot=scene.robot_identity,
         preamble=responses.preamble,
         sts1=responses.sts1,
         sts2=responses.sts2,
@@ -153,11 +182,14 @@ def _one_receiver(
     return capture, contributions
 
 
-def _part(scene: Scene, run: int, receiver: str, index: int) -> _Part:
+def _part(scene: Scene, run: int, receiver: str, index: int, *, background: bool) -> _Part:
     use, term, params = scene.terms[index]
     owner = "" if term.shared else receiver
     key = (zlib.crc32(owner.encode()), zlib.crc32(use.name.encode()))
     of_run = of_prepare = _Stream(scene.model.seed, (run, *key))
+    if background:
+        of_run = _Stream(scene.model.seed, (_BACKGROUND, run, *key))
+        of_prepare = of_prepare if term.of_robot or term.of_place else of_run
     if term.of_robot and scene.robot_seed is not None:
         of_prepare = _Stream(scene.robot_seed, (_NO_RUN, scene.model.radar.channel, *key))
     return _Part(use.name, term(params), of_run, of_prepare)
@@ -192,8 +224,8 @@ def _view(scene: Scene, radar: Radar, trajectory: Trajectory, objects: tuple[Sce
 def _described(scene: Scene, contributions: Mapping[str, Sequence[Contribution]]) -> str:
     """Description for the captures' file: how they were made."""
     about = scene.model.description or scene.name
-    if scene.robot_seed is not None:
-        about += f" Robot {scene.robot or 'without a file'}, seed {scene.robot_seed}."
+    if scene.robot_identity:
+        about += f" Robot {scene.robot_identity}."
     parts = [f"{receiver}: {described(of_terms)}" for receiver, of_terms in contributions.items()]
     return " | ".join([f"Simulated by uwbbench. {about}", *parts])
 

@@ -44,8 +44,15 @@ MATERIALS = {
     "chipboard": Material(2.58, 0.0, 0.0217, 0.78, (1e9, 100e9)),
     "plywood": Material(2.71, 0.0, 0.33, 0.0, (1e9, 40e9)),
     "glass": Material(6.31, 0.0, 0.0036, 1.3394, (0.1e9, 100e9)),
+    "person": Material(45.74, -0.1577, 0.3779, 1.3164, (3e9, 10.6e9)),
 }
-"""Materials that a scene may name."""
+"""Materials that a scene may name.
+
+A person is no row of the recommendation, but dry skin, which waves of these frequencies hardly pass: power laws fitted
+here from 3 to 10.6 GHz to the parametric model of S. Gabriel, Lau and Gabriel (Phys. Med. Biol. 41, 1996, 2271), within
+3 % of its permittivity, 8 % of its conductivity and 0.002 of its reflection. A ``person`` of a scene then returns like
+0.6 square metres at 2 m. That clothes and a body that is no smooth cylinder change nothing is chosen.
+"""
 
 SHAPE_LOSS_DB = {"concrete": 6.0, "plywood": 3.0}
 """Fitted, not measured: what a box of this material loses against an ideal flat face, by its edges and roughness.

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 from pydantic import Field, model_validator
 
 from uwbbench.api import EchoFading, EchoTail, FloatArray, Obstacle, Params, SceneObject, rotate_z
+from uwbbench_datasets.simulator.motion import Motion, Walk, places_m
 from uwbbench_datasets.simulator.trajectory import Point, in_space
 
 _SIZES = {
@@ -35,7 +36,9 @@ class ObjectModel(Params):
 
     id: str = Field(min_length=1, description="Name of the object; also its address for vary and --set.")
     shape: Literal["plate", "box", "rod", "wall", "person", "point"]
-    center_m: Point = Field(description="Centre of the body; z, if left out, is the radar's height of 0.")
+    center_m: Point | None = Field(
+        None, description="Centre of the body; z, if left out, is the radar's height of 0. Waypoints take its place."
+    )
     yaw_deg: float = Field(0.0, description="Heading of the front's outward normal; the width runs across it.")
     width_m: float | None = Field(None, gt=0)
     depth_m: float | None = Field(None, gt=0)
@@ -51,6 +54,7 @@ class ObjectModel(Params):
     bearing_bias_deg: float = Field(0.0, description="Constant error of the direction that echoes seem to come from.")
     bearing_sd_deg: float = Field(0.0, ge=0, description="Standard deviation of the rest of that error (glint).")
     bearing_length_m: float = Field(0.05, gt=0, description="Way of the receiver over which it becomes another.")
+    motion: Motion | None = Field(None, description="How it moves; it stands still if left out. Its heading stays.")
     structure: bool | None = Field(None, description="Not an obstacle to be found; true for walls if left out.")
 
     @model_validator(mode="after")
@@ -67,15 +71,27 @@ class ObjectModel(Params):
             raise ValueError(f"a wall has no {sorted(mirrors)[0]}: its echo is that of a mirror")
         return self
 
+    @model_validator(mode="after")
+    def _has_a_place(self) -> ObjectModel:
+        walks = isinstance(self.motion, Walk)
+        if self.shape == "wall" and self.motion is not None:
+            raise ValueError("a wall does not move")
+        if walks and self.center_m is not None:
+            raise ValueError("center_m and the points_m of its motion both say where it is; leave center_m out")
+        if not walks and self.center_m is None:
+            raise ValueError(f"a {self.shape} needs center_m")
+        return self
+
     def _size(self, name: str) -> float:
         value = getattr(self, name)
         return float(_USUAL.get(self.shape, {}).get(name, 0.0) if value is None else value)
 
     def body(self) -> SceneObject:
-        """The object as terms and the ground truth see it."""
+        """The object as terms and the ground truth see it; where it moves, at the start of its way."""
         across = 2 * self._size("radius_m")
         width, depth = self._size("width_m") or across, self._size("depth_m") or across
-        center, yaw = in_space(self.center_m), float(np.radians(self.yaw_deg))
+        place = self.motion.points_m[0] if isinstance(self.motion, Walk) else self.center_m
+        center, yaw = in_space(place or []), float(np.radians(self.yaw_deg))
         structure = self.shape == "wall" if self.structure is None else self.structure
         outline = center[:2] + rotate_z(_outline(self.shape, width, depth), yaw)[:, :2]
         obstacle = Obstacle(self.id, self.material, outline, structure)
@@ -96,6 +112,22 @@ class ObjectModel(Params):
             bearing_length_m=self.bearing_length_m,
         )
 
+    def moving(self, timestamp_s: FloatArray, rng: np.random.Generator) -> SceneObject:
+        """The object at each of these times (frames,).
+
+        Parameters
+        ----------
+        timestamp_s : (frames,) array
+        rng : Generator
+            Draws what is random about its motion.
+        """
+        body = self.body()
+        if self.motion is None:
+            return body
+        center_m = places_m(self.motion, body.center_m, body.yaw_rad, timestamp_s, rng)
+        outline_m = body.obstacle.outline_m + (center_m - body.center_m)[:, None, :2]
+        return replace(body, center_m=center_m, obstacle=replace(body.obstacle, outline_m=outline_m))
+
 
 def _outline(shape: str, width: float, depth: float) -> FloatArray:
     """Outline (vertices, 3) seen from above, centred, with the front along +x."""
@@ -115,6 +147,7 @@ class Face:
     Attributes
     ----------
     center_m : (3,) array
+        Or (frames, 3) where the body moves.
     normal, across : (3,) array
         Unit vectors outwards and along the width.
     width_m, height_m : float

@@ -10,7 +10,7 @@ import re
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from pydantic import Field
@@ -52,6 +52,7 @@ class _Part:
     receiver: str | None
     channel: int | None
     rows: IntArray | None
+    recording: str
 
 
 class Table(Dataset[TableParams]):
@@ -132,16 +133,16 @@ class Table(Dataset[TableParams]):
     def _parts(self, stem: str, path: Path) -> dict[str, _Part]:
         """Captures in a file, by name."""
         mapping = self._mapping
-        recording = open_recording(path, mapping.delimiter)
+        table = open_recording(path, mapping.delimiter)
         splitting = {
             key: column
             for key in ("run_column", "receiver_column", "channel_column")
             if (column := getattr(mapping, key)) is not None
         }
         if not splitting:
-            return {stem: _Part(path, path.stem, None, mapping.radar.channel, None)}
-        require_columns(recording, {column: key for key, column in splitting.items()})
-        columns = recording.read(list(splitting.values()))
+            return {stem: _Part(path, path.stem, None, mapping.radar.channel, None, stem)}
+        require_columns(table, {column: key for key, column in splitting.items()})
+        columns = table.read(list(splitting.values()))
         labels = {key: labels_of(columns[column], path, column) for key, column in splitting.items()}
         together: dict[tuple[str, ...], list[int]] = {}
         for row, key in enumerate(zip(*labels.values(), strict=True)):
@@ -155,7 +156,8 @@ class Table(Dataset[TableParams]):
                 value["channel_column"] = f"ch{channel}"
             name = "/".join((stem, *value.values()))
             run, receiver = value.get("run_column", path.stem), value.get("receiver_column")
-            parts[name] = _Part(path, run, receiver, channel, np.array(rows))
+            recording = f"{stem}/{run}" if "run_column" in value else stem
+            parts[name] = _Part(path, run, receiver, channel, np.array(rows), recording)
         return parts
 
     def _capture(self, name: str, part: _Part) -> Capture:
@@ -169,13 +171,13 @@ class Table(Dataset[TableParams]):
             timestamp_s = table.vector(mapping.time.column, TIME_S[mapping.time.unit])
         else:
             timestamp_s = np.arange(frames) / (rate_hz or np.nan)
-        reported = {
+        reported: dict[str, Any] = {
             f"first_path_index{'' if key == 'preamble' else '_' + key}": table.vector(column)
             for key, column in (mapping.first_path.model_dump() if mapping.first_path else {}).items()
             if column is not None
         }
         position_m, yaw_rad = table.pose(mapping.pose) if mapping.pose else (np.zeros((frames, 3)), np.zeros(frames))
-        odometry: dict[str, FloatArray] = {}
+        odometry: dict[str, Any] = {}
         if mapping.odometry:
             odometry["odometry_position_m"], odometry["odometry_yaw_rad"] = table.pose(mapping.odometry)
         if len(timestamp_s) != frames:
@@ -198,6 +200,7 @@ class Table(Dataset[TableParams]):
             sts2=sts[1] if sts else None,
             **reported,
             **odometry,
+            recording=part.recording,
             receivers=(radar.receiver,),
         )
 

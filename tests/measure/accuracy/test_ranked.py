@@ -12,8 +12,10 @@ from tests.detect.test_shipped_detectors import plate
 from tests.measure.accuracy.test_scoring import capture_of, found_in, post
 from uwbbench import load_detector
 from uwbbench.api import Detections
-from uwbbench.measure.accuracy.judge import Scene, ScoringRules, judge
+from uwbbench.measure.accuracy.judge import judge
 from uwbbench.measure.accuracy.ranked import order_of, pooled, ranked
+from uwbbench.measure.accuracy.rules import ScoringRules
+from uwbbench.measure.accuracy.scene import Scene
 
 FRAMES = 4
 RULES = ScoringRules("object")
@@ -35,6 +37,7 @@ def at(candidates, capture, threshold):
     return int(outcome.tp.sum()), int(outcome.fp.sum())
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=80)
 @given(
     rows=st.lists(

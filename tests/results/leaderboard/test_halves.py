@@ -71,6 +71,7 @@ def content(runs: list[Path]) -> Content:
     return content_of(*runs)
 
 
+@pytest.mark.slow
 def test_the_halves_are_two_suites_that_know_each_other(content: Content) -> None:
     found = content.suites
     assert len(found) == 2

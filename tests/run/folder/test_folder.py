@@ -1,6 +1,7 @@
 """What goes into a run folder comes out again."""
 
 import dataclasses
+import json
 from pathlib import Path
 
 import numpy as np
@@ -93,6 +94,18 @@ def test_a_header_comes_back_exactly(folder: RunFolder, approach: Capture, movin
 def test_a_header_without_truth_comes_back_without(folder: RunFolder, approach: Capture) -> None:
     folder.write_header("id", dataclasses.replace(approach, truth=None).header, "hash")
     assert folder.header("id").truth is None
+
+
+def test_a_header_of_an_earlier_version_has_the_usual_recording_and_no_robot(
+    folder: RunFolder, approach: Capture
+) -> None:
+    header = dataclasses.replace(approach, name="monday/front", recording="walk", robot="twin, seed 1").header
+    folder.write_header("id", header, "hash")
+    assert (folder.header("id").recording, folder.header("id").robot) == ("walk", "twin, seed 1")
+    (stored,) = (folder.path / "captures").glob("*.json")
+    facts = json.loads(stored.read_text())
+    stored.write_text(json.dumps({name: value for name, value in facts.items() if name not in ("recording", "robot")}))
+    assert (folder.header("id").recording, folder.header("id").robot) == ("monday", "")
 
 
 def test_scores_come_back_with_their_rules(folder: RunFolder) -> None:

@@ -116,6 +116,7 @@ def test_a_chart_is_well_formed_and_has_no_colours_of_paper(alice: Path) -> None
     assert "SIMULATED" in words
 
 
+@pytest.mark.slow
 def test_a_dataset_shows_causes_of_errors_and_every_threshold_and_says_simulated(alice: Path) -> None:
     content = content_of(alice)
     (section,) = content.sections
@@ -130,6 +131,7 @@ def test_a_dataset_shows_causes_of_errors_and_every_threshold_and_says_simulated
     assert "Causes of errors, and every threshold" in [part.title for part in page.parts]
 
 
+@pytest.mark.slow
 def test_no_absolute_time_of_several_machines_is_in_a_ranking(alice: Path, tmp_path: Path) -> None:
     content = content_of(alice, elsewhere(alice, tmp_path / "far", 2.0))
     for page in pages(content):
@@ -143,6 +145,7 @@ def test_no_absolute_time_of_several_machines_is_in_a_ranking(alice: Path, tmp_p
     assert "frame period" not in pareto[0], "it is another ratio on each machine"
 
 
+@pytest.mark.slow
 def test_failures_are_told_with_reason_and_escaped(alice: Path, tmp_path: Path) -> None:
     capture = RunFolder(alice).entries()[0].capture
     files = rendered(content_of(failing(alice, tmp_path / "broken", "twin", capture)))
@@ -151,6 +154,7 @@ def test_failures_are_told_with_reason_and_escaped(alice: Path, tmp_path: Path) 
     assert "5 of 6" in text
 
 
+@pytest.mark.slow
 def test_hostile_names_stay_names(make: Make, tmp_path: Path) -> None:
     name = json.dumps(HOSTILE)
     run = make(

@@ -26,8 +26,10 @@ import numpy as np
 
 from uwbbench.api.arrays import BoolArray, FloatArray, IntArray
 from uwbbench.api.detections import Detections
-from uwbbench.measure.accuracy.judge import Scene, ScoringRules, judge
+from uwbbench.measure.accuracy.judge import judge
 from uwbbench.measure.accuracy.matching import match
+from uwbbench.measure.accuracy.rules import ScoringRules
+from uwbbench.measure.accuracy.scene import Scene
 
 SCORES = ("score_db", "prominence", "amplitude")
 """Columns that order candidates where a detector names none, the first that they have."""

@@ -119,7 +119,7 @@ def zero_noise_taps(subject: Subject) -> Evidence:
         samples[:, :NOISE_TAPS] = 0
         return samples
 
-    capture = altered(subject.capture, silenced)
+    capture = altered(subject.capture, silenced, receiver=True)
     detections = subject.run_altered(capture)
     return Evidence(f"{len(detections)} detections, echo found in {hit_share(detections, capture):.0%} of frames")
 
@@ -127,7 +127,7 @@ def zero_noise_taps(subject: Subject) -> Evidence:
 @hard_case("survive")
 def dc_offset(subject: Subject) -> Evidence:
     """With an offset of half the noise on every sample the echo is found as often, within a tenth of the frames."""
-    capture = altered(subject.capture, lambda samples: samples + NOISE / 2 * (1 + 1j) / np.sqrt(2))
+    capture = altered(subject.capture, lambda samples: samples + NOISE / 2 * (1 + 1j) / np.sqrt(2), receiver=True)
     detections = subject.run_altered(capture)
     return Evidence(still_found(detections, capture, hit_share(subject.usual, subject.capture), 0.10))
 
@@ -142,7 +142,7 @@ def clipped_samples(subject: Subject) -> Evidence:
 
     The limit of 0.9 cuts the crests of the frames whose phase puts them on one axis, and makes plateaus of them.
     """
-    capture = altered(subject.capture, lambda samples: _clipped(samples, 0.9))
+    capture = altered(subject.capture, lambda samples: _clipped(samples, 0.9), receiver=True)
     detections = subject.run_altered(capture)
     return Evidence(still_found(detections, capture, hit_share(subject.usual, subject.capture), 0.10))
 
@@ -154,7 +154,7 @@ def hard_clipped_samples(subject: Subject) -> Evidence:
     So far into saturation the direct path is a plateau of no known delay, phase or gain, and finding the echo is not
     asked for.
     """
-    capture = altered(subject.capture, lambda samples: _clipped(samples, 0.3))
+    capture = altered(subject.capture, lambda samples: _clipped(samples, 0.3), receiver=True)
     detections = subject.run_altered(capture)
     return Evidence(f"{len(detections)} detections, echo found in {hit_share(detections, capture):.0%} of frames")
 
@@ -198,7 +198,7 @@ def denormal_capture(subject: Subject) -> Evidence:
 
     Samples hold a few digits there, so that nothing is asked of what is found.
     """
-    detections = subject.run_altered(altered(subject.capture, lambda samples: samples * 1e-310))
+    detections = subject.run_altered(altered(subject.capture, lambda samples: samples * 1e-310, receiver=True))
     return Evidence(f"{len(detections)} detections")
 
 
@@ -210,7 +210,7 @@ def denormal_noise(subject: Subject) -> Evidence:
         samples[:, :NOISE_TAPS] = 5e-324
         return samples
 
-    detections = subject.run_altered(altered(subject.capture, quieted))
+    detections = subject.run_altered(altered(subject.capture, quieted, receiver=True))
     return Evidence(f"{len(detections)} detections")
 
 
@@ -228,7 +228,7 @@ def denormals_kept(subject: Subject) -> Evidence:
 
 
 def _scaled(subject: Subject, factor: float) -> Evidence:
-    detections = subject.run_altered(altered(subject.capture, lambda samples: samples * factor))
+    detections = subject.run_altered(altered(subject.capture, lambda samples: samples * factor, receiver=True))
     return unchanged(detections, subject.usual, EXACT_M)
 
 
@@ -260,7 +260,7 @@ def int16_range(subject: Subject) -> Evidence:
         steps = samples * (32767 / 1.5)
         return _clipped(np.rint(steps.real) + 1j * np.rint(steps.imag), 32767.0)
 
-    return _hardly_flipped(subject.run_altered(altered(subject.capture, rounded)), subject.usual, 0.02)
+    return _hardly_flipped(subject.run_altered(altered(subject.capture, rounded, receiver=True)), subject.usual, 0.02)
 
 
 def _stored(samples: ComplexArray) -> ComplexArray:
@@ -270,7 +270,7 @@ def _stored(samples: ComplexArray) -> ComplexArray:
 @hard_case("equal")
 def single_precision(subject: Subject) -> Evidence:
     """Samples stored as complex64 yield the same detections as complex128, but for one in a hundred."""
-    return _hardly_flipped(subject.run_altered(altered(subject.capture, _stored)), subject.usual, 0.01)
+    return _hardly_flipped(subject.run_altered(altered(subject.capture, _stored, receiver=True)), subject.usual, 0.01)
 
 
 @hard_case("equal")
@@ -286,8 +286,8 @@ def one_ulp_noise(subject: Subject) -> Evidence:
         towards = rng.choice(np.array([-np.inf, np.inf], np.float32), parts.shape)
         return np.asarray(np.nextafter(parts, towards).view(np.complex64))
 
-    stored = subject.run_altered(altered(subject.capture, _stored))
-    return _hardly_flipped(subject.run(altered(subject.capture, moved)), stored, 0.01)
+    stored = subject.run_altered(altered(subject.capture, _stored, receiver=True))
+    return _hardly_flipped(subject.run(altered(subject.capture, moved, receiver=True)), stored, 0.01)
 
 
 @hard_case("equal")

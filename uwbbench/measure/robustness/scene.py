@@ -15,6 +15,7 @@ import numpy as np
 from uwbbench.api.arrays import ComplexArray, FloatArray, IntArray
 from uwbbench.api.capture import Capture
 from uwbbench.api.geometry import SPEED_OF_LIGHT_M_S, excess_path
+from uwbbench.api.radar import Radar
 from uwbbench.api.trial import RADAR
 from uwbbench.api.truth import Obstacle, Trajectory, Truth
 
@@ -25,6 +26,7 @@ PULSE_TAPS = 3.2
 ECHO, NOISE = 0.12, 0.005
 """Amplitudes of the echo and of the noise (RMS), the direct path being 1: the echo stands 27 dB above the noise."""
 START_M, STEP_M, SIDE_M = 3.2, 0.0125, 0.1
+SEED, BACKGROUND_SEED = 20250612, 20250613
 RINGING = ((1.0, 0.10 + 0.05j), (2.0, -0.03 + 0.04j))
 """Delay in taps and amplitude of what moves along with the robot."""
 
@@ -44,6 +46,7 @@ def approach(
     """Approach to one target, with a direct path, ringing and white noise.
 
     Delay, phase and gain of the direct path change from frame to frame, as on transceivers whose grid is not locked.
+    The background is a recording of the same radar on the same way, with nothing in view.
 
     Parameters
     ----------
@@ -57,7 +60,20 @@ def approach(
     frames : int
         Number of frames.
     """
-    rng = np.random.default_rng(20250612)
+    background = _recorded("hard-case background", (), None, direct, frames, BACKGROUND_SEED)
+    capture = _recorded("hard-case", echoes, standing, direct, frames, SEED)
+    return dataclasses.replace(capture, background=background)
+
+
+def _recorded(
+    name: str,
+    echoes: Sequence[tuple[float, complex]],
+    standing: Callable[[IntArray], Sequence[tuple[float, ComplexArray]]] | None,
+    direct: float,
+    frames: int,
+    seed: int,
+) -> Capture:
+    rng = np.random.default_rng(seed)
     index = np.arange(frames)
     position_m = np.stack([index * STEP_M, np.zeros(frames), np.zeros(frames)], axis=1)
     target_m = np.array([START_M, SIDE_M, 0.0])
@@ -81,11 +97,12 @@ def approach(
         white = NOISE / np.sqrt(2) * (rng.normal(size=tap.shape) + 1j * rng.normal(size=tap.shape))
         clean = fixed * direct_turn**antenna + moving * turn[:, None] ** antenna
         responses.append(gain[:, None] * clean + white)
+    target = Obstacle("target", "metal", target_m[None, :2])
     return Capture(
-        name="hard-case",
+        name=name,
         radar=RADAR,
         trajectory=Trajectory(index / RADAR.frame_rate_hz, position_m, np.zeros(frames)),
-        truth=Truth((Obstacle("target", "metal", target_m[None, :2]),)),
+        truth=Truth((target,) if echoes else ()),
         source="simulated",
         preamble=responses[0],
         sts1=responses[1],
@@ -96,10 +113,34 @@ def approach(
     )
 
 
-def altered(capture: Capture, change: Callable[[ComplexArray], Any]) -> Capture:
-    """Capture whose three responses (frames, taps) went through ``change``, which is given copies."""
+def altered(capture: Capture, change: Callable[[ComplexArray], Any], *, receiver: bool = False) -> Capture:
+    """Capture whose three responses (frames, taps) went through ``change``, which is given copies.
+
+    Parameters
+    ----------
+    capture : Capture
+    change : callable
+    receiver : bool
+        What changes is the receiver: so does its background.
+    """
     parts: dict[str, Any] = {name: change(np.array(getattr(capture, name))) for name in ("preamble", "sts1", "sts2")}
+    if receiver and capture.background is not None:
+        parts["background"] = altered(capture.background, change)
     return dataclasses.replace(capture, **parts)
+
+
+def on_radar(capture: Capture, radar: Radar, **parts: Any) -> Capture:
+    """Capture, and its background, of another radar.
+
+    Parameters
+    ----------
+    capture : Capture
+    radar : Radar
+    **parts
+        What else is replaced in both.
+    """
+    background = None if capture.background is None else on_radar(capture.background, radar, **parts)
+    return dataclasses.replace(capture, radar=radar, background=background, **parts)
 
 
 def chosen(capture: Capture, rows: IntArray, timestamp_s: FloatArray | None = None) -> Capture:

@@ -94,8 +94,8 @@ class Ranking:
 
     @property
     def metrics(self) -> MetricChoice:
-        """Metrics of its suite."""
-        return self.suite.metrics
+        """Metrics of its suite in its scoring."""
+        return self.suite.metrics.of(self.board[2])
 
     @property
     def headline(self) -> list[str]:
@@ -121,13 +121,13 @@ def rankings(suite: Suite) -> list[Ranking]:
         for one in contender.scored:
             boards[one.dataset, one.source, one.scoring, one.table][contender.key].append(one)
     datasets = suite.datasets
-    scorings: list[str] = [rule.scoring for rule in suite.newest.rules]
+    scorings = suite.scorings
     order = sorted(boards, key=lambda b: (datasets.index(b[0]), b[1], scorings.index(b[2]), b[3]))
     return [_ranking(suite, board, boards[board]) for board in order]
 
 
 def _ranking(suite: Suite, board: Board, members: Mapping[str, list[Scored]]) -> Ranking:
-    metrics = suite.metrics
+    metrics = suite.metrics.of(board[2])
     exhaustive = all(one.outcome.exhaustive for scored in members.values() for one in scored)
     estimates = {key: estimates_of(metrics, scored, SETTINGS) for key, scored in members.items()}
     speeds = speeds_of(suite, board[0])

@@ -121,10 +121,15 @@ class Suite:
         """Captures of a dataset."""
         return [capture for label, capture in self.captures if label == dataset]
 
+    @property
+    def scorings(self) -> list[str]:
+        """Scorings, in the order of the experiment."""
+        return [rule.scoring for rule in self.newest.rules]
+
     @cached_property
     def metrics(self) -> MetricChoice:
         """Metrics that its runs show; what the newest run lists comes first."""
-        return combined([run.experiment["metrics"] for run in reversed(self.runs)])
+        return combined([run.experiment["metrics"] for run in reversed(self.runs)], self.scorings)
 
     @property
     def datasets(self) -> list[str]:

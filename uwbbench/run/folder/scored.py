@@ -14,9 +14,9 @@ from uwbbench.api.interruption import by_plugin
 from uwbbench.api.metric import Metric, Outcome
 from uwbbench.config.rules import RegionModel
 from uwbbench.measure.accuracy.causes import Causes, causes
-from uwbbench.measure.accuracy.judge import Scene
-from uwbbench.measure.accuracy.metrics.choice import MetricChoice, Metrics, names_of
-from uwbbench.measure.accuracy.scoring import Region, ScoringRules, outcomes, score_scene
+from uwbbench.measure.accuracy.metrics.choice import MetricChoice, Metrics
+from uwbbench.measure.accuracy.scene import Scene
+from uwbbench.measure.accuracy.scoring import Region, ScoringRules, column_of, outcomes, score_scene
 from uwbbench.measure.accuracy.stats import evaluate
 from uwbbench.run.folder.folder import RunFolder
 from uwbbench.run.folder.identity import canonical
@@ -142,8 +142,8 @@ def with_metrics(
     StoreError
         If stored detections are missing or broken.
     """
-    metrics, listed = MetricChoice(chosen), names_of(chosen)
-    columns = {name: column_of(name, metrics[name].unit) for name in listed if name not in metrics.absent}
+    metrics = MetricChoice(chosen, [rule.scoring for rule in rules])
+    columns = {name: column_of(name, metrics[name].unit) for name in metrics.listed if name not in metrics.absent}
     completed = {unit: list(rows) for unit, rows in rows_of.items()}
     for entry in folder.entries() if columns else ():
         rows = completed.get(entry.unit, []) if entry.kind == "accuracy" else []
@@ -159,7 +159,11 @@ def with_metrics(
         for place, row in enumerate(rows):
             if row["status"] == "scored":
                 outcome = tables[row["scoring"]][row["table"]]
-                values = {column: _value(name, metrics[name], outcome) for name, column in columns.items()}
+                here = metrics.of(row["scoring"])
+                values = {
+                    column: _value(name, here[name], outcome) if name in here else None
+                    for name, column in columns.items()
+                }
                 rows[place] = values | row  # what is stored for every run anyway stays
     return completed
 
@@ -175,11 +179,6 @@ def _value(name: str, metric: type[Metric], outcome: Outcome) -> float | None:
             "continue the run with --resume"
         ) from error
     return None if math.isnan(value) else value
-
-
-def column_of(name: str, unit: str) -> str:
-    """Column of a metric: lengths say that they are in metres."""
-    return f"{name}_m" if unit == "m" else name
 
 
 def table_of(entries: Iterable[Entry], rows_of: Mapping[str, list[dict[str, Any]]]) -> list[dict[str, Any]]:

@@ -16,6 +16,10 @@ from uwbbench.api.truth import Obstacle, Trajectory, Truth
 from uwbbench.measure.accuracy.ranked import RankedCounts
 from uwbbench.run.folder.files import read_json, read_parquet, write_json, write_parquet
 
+_ABOUT = ("name", "source", "license", "citation", "description")
+_LATER = ("recording", "robot")
+"""Texts about a capture: those that are always there, and those that earlier versions did not store."""
+
 
 def as_spans(frames: IntArray) -> list[list[int]]:
     """Sorted frame indices as ``[first, last + 1]`` spans.
@@ -120,7 +124,7 @@ def write_header(stem: Path, header: CaptureHeader, sha256: str) -> None:
         else:
             label["outline_m"] = item.outline_m
         objects.append(label)
-    about = {name: getattr(header, name) for name in ("name", "source", "license", "citation", "description")}
+    about = {name: getattr(header, name) for name in (*_ABOUT, *_LATER)}
     truth = None if header.truth is None else {"exhaustive": header.truth.exhaustive, "objects": objects}
     write_parquet(stem.with_suffix(".parquet"), pa.table(columns), {})
     write_json(stem.with_suffix(".json"), {**about, "sha256": sha256, "radar": header.radar.to_dict(), "truth": truth})
@@ -151,7 +155,8 @@ def read_header(stem: Path) -> CaptureHeader:
         truth = Truth(tuple(objects), data["truth"]["exhaustive"])
     position_m = np.stack([column(f"{axis}_m") for axis in "xyz"], axis=1)
     return CaptureHeader(
-        **{name: data[name] for name in ("name", "source", "license", "citation", "description")},
+        **{name: data[name] for name in _ABOUT},
+        **{name: data[name] for name in _LATER if name in data},
         radar=Radar(**radar),
         trajectory=Trajectory(column("timestamp_s"), position_m, column("yaw_rad")),
         truth=truth,

@@ -24,6 +24,7 @@ from uwbbench.api.errors import UwbbenchError
 from uwbbench.api.text import one_line, printable
 from uwbbench.config.detector import RESULTS, detector_identity, from_results
 from uwbbench.measure.accuracy.metrics.choice import MetricChoice, names_of
+from uwbbench.measure.accuracy.scoring import column_of
 from uwbbench.run.folder.folder import RunFolder
 from uwbbench.run.folder.identity import (
     accuracy_identity,
@@ -36,7 +37,7 @@ from uwbbench.run.folder.identity import (
 )
 from uwbbench.run.folder.journal import Entry
 from uwbbench.run.folder.reported import REPORTED_FACT, RESULTS_FACT, reported_times
-from uwbbench.run.folder.scored import causes_of, column_of, rules_of, score_rows, table_of, with_metrics
+from uwbbench.run.folder.scored import causes_of, rules_of, score_rows, table_of, with_metrics
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -325,11 +326,12 @@ class _Verifier:
     def _stored_metrics(self, table: pd.DataFrame) -> list[str]:
         """Listed metrics that were stored, which version 0.1.0 did not, and are installed."""
         listed = names_of(self.manifest["experiment"]["metrics"])
-        metrics = MetricChoice(listed)
+        metrics = MetricChoice(listed, [rule.scoring for rule in self.folder.rules])
         self.notes += [
             f"metric {_shown(name)} is not installed: its values were not checked" for name in metrics.absent
         ]
-        return [name for name in listed if name not in metrics.absent and column_of(name, metrics[name].unit) in table]
+        there = [name for name in metrics.listed if name not in metrics.absent]
+        return [name for name in there if column_of(name, metrics[name].unit) in table]
 
     def _same(self, where: str, stored: list[Any], again: list[dict[str, Any]]) -> None:
         """Rows that were stored and computed again."""

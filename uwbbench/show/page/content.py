@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property
@@ -118,7 +119,7 @@ class Content:
 
     def charted(self, board: Board) -> list[str]:
         """Metrics that charts of a board show."""
-        return self.report.metrics.headline(exhaustive=self.exhaustive(board))
+        return self.report.metrics.of(board[2]).headline(exhaustive=self.exhaustive(board))
 
     def _latencies(self) -> Iterator[Spec]:
         sources = {board[0]: board[1] for board in self.boards}
@@ -175,7 +176,7 @@ class Content:
                 detectors[one.detector],
                 one.captures,
                 one.frames,
-                [_packed(one.estimates[name]) for name in self.quantities],
+                [_packed(one.estimates.get(name, _NOT_HERE)) for name in self.quantities],
                 one.hits > 0,
                 one.errors,
             ]
@@ -198,7 +199,8 @@ class Content:
 
     def _board(self, board: Board, materials: Mapping[str, str]) -> dict[str, Any]:
         dataset, source, scoring, table = board
-        members, metrics, exhaustive = self.boards[board], self.report.metrics, self.exhaustive(board)
+        members, exhaustive = self.boards[board], self.exhaustive(board)
+        metrics = self.report.metrics.of(scoring)
         same = {
             f"{channel}|{materials.get(material, '')}": f"{kept[0]}|{materials.get(kept[1], '')}"
             for (channel, material), (kept, _) in cuts(members).items()
@@ -231,6 +233,10 @@ class Content:
                 why = "it does not cluster positions" if board[3] == "mapping" else "it could not be scored"
                 said.append(f"{label}: not here, as {why}.")
         return said
+
+
+_NOT_HERE = Estimate(math.nan, math.nan, math.nan, 0, 0)
+"""Of a metric that has no meaning in a scoring, whose boards have no column for it."""
 
 
 def _of_board(one: SetAside, board: Board) -> bool:

@@ -153,8 +153,9 @@ def _leaderboards(report: Report, rows_of: Sequence[tuple[dict[str, Any], Any]])
         groups.setdefault(key, []).append((about, estimates))
     for (dataset, source, scoring, table), members in groups.items():
         open_world = any(not about["exhaustive"] for about, _ in members)
-        main = report.metrics.ranking(exhaustive=not open_world)
-        columns = [quantities[name] for name in report.metrics.defined(exhaustive=not open_world)]
+        metrics = report.metrics.of(scoring)
+        main = metrics.ranking(exhaustive=not open_world)
+        columns = [quantities[name] for name in metrics.defined(exhaustive=not open_world)]
         columns.sort(key=lambda by: by.name != main)
         heads = [columns[0].axis, "p50 (us)", "p99 (us)", *(by.axis for by in columns[1:])]
         extra = (["chance recall"] if open_world else []) + ["n", "frames"]
@@ -173,7 +174,7 @@ def _leaderboards(report: Report, rows_of: Sequence[tuple[dict[str, Any], Any]])
         seen = table == "mapping" and report.folder.rules[0].surface == "visible"
         faces = ["Errors are distances to the part of an outline that the receiver can see (surface: visible)."] * seen
         faces += [f"Scored {text}."] if (text := _own_region(report, dataset)) else []
-        said = _leaderboard_notes(members, quantities, report.metrics, report.timed)
+        said = _leaderboard_notes(members, quantities, metrics, report.timed)
         notes = (*map(set_aside_warning, few), *faces, *said)
         yield Sheet(title, ("detector", "rank", *heads, *extra), tuple(rows), notes)
 

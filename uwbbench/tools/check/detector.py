@@ -20,7 +20,7 @@ from uwbbench.api.detections import Detections
 from uwbbench.api.errors import ConfigError
 from uwbbench.api.registry import AuthoredKind
 from uwbbench.detect.pipeline import Pipeline, detector_from_yaml, load_detector
-from uwbbench.measure.robustness.scene import chosen
+from uwbbench.measure.robustness.scene import chosen, on_radar
 from uwbbench.measure.robustness.subject import Subject as HardSubject
 from uwbbench.tools.check.check import Nonconformity, check
 from uwbbench.tools.check.inputs import CALLS, CUTS, call_s, usual_capture
@@ -186,6 +186,12 @@ def captures_without_sts_are_fine(subject: DetectorSubject) -> str:
     return _on(subject, usual_capture(sts=False))
 
 
+@check("uwbbench.api.stage.Stage.show_background")
+def captures_without_background_are_fine(subject: DetectorSubject) -> str:
+    """Without a background the detector runs or says in one message why not; ``optional: true`` leaves steps out."""
+    return _on(subject, usual_capture(background=False))
+
+
 @check("uwbbench.api.stage.Stage")
 def captures_without_truth_are_fine(subject: DetectorSubject) -> str:
     """Without ground truth a detector that is not a reference finds the same: no real radar has it."""
@@ -265,7 +271,7 @@ def other_channels_are_fine(subject: DetectorSubject) -> str:
     """A radar without a channel runs or is refused in one message: values by channel need an ``other``."""
     usual = subject.capture
     radar = dataclasses.replace(usual.radar, channel=None)
-    return _on(subject, dataclasses.replace(usual, radar=radar))
+    return _on(subject, on_radar(usual, radar))
 
 
 CHECKS = (
@@ -276,6 +282,7 @@ CHECKS = (
     stream_equals_batch,
     streams_share_nothing,
     captures_without_sts_are_fine,
+    captures_without_background_are_fine,
     captures_without_truth_are_fine,
     other_channels_are_fine,
     empty_captures_are_fine,

@@ -15,7 +15,7 @@ import numpy as np
 from uwbbench.api.block import Block
 from uwbbench.api.capture import Capture
 from uwbbench.api.frames import Frames
-from uwbbench.measure.robustness.scene import altered, approach
+from uwbbench.measure.robustness.scene import altered, approach, on_radar
 
 FRAMES, CALLS = 128, 60
 INVALID, ZERO, LOUD = (5, 40, 41), 11, 17
@@ -40,21 +40,25 @@ def call_s(step: Callable[[Any], object], calls: Sequence[Any]) -> float:
 
 
 @cache
-def usual_capture(*, sts: bool = True, truth: bool = True) -> Capture:
-    """Approach to one echo in complex64 samples, with invalid, zero and very strong frames."""
+def usual_capture(*, sts: bool = True, truth: bool = True, background: bool = True) -> Capture:
+    """Approach to one echo in complex64 samples, with invalid, zero and very strong frames, and a background."""
 
-    def flawed(samples: np.ndarray) -> np.ndarray:
+    def partly_invalid(samples: np.ndarray) -> np.ndarray:
         samples[INVALID, 3] = np.nan
-        samples[ZERO] = 0
-        samples[LOUD] *= 1000
         return samples.astype(np.complex64)
 
-    capture = altered(approach(frames=FRAMES), flawed)
+    def flawed(samples: np.ndarray) -> np.ndarray:
+        samples[ZERO] = 0
+        samples[LOUD] *= 1000
+        return samples
+
+    capture = altered(altered(approach(frames=FRAMES), flawed), partly_invalid, receiver=True)
     if not sts:
         radar = dataclasses.replace(capture.radar, has_sts=False, array_spacing_m=None)
-        absent: dict[str, Any] = dict.fromkeys(("sts1", "sts2", "first_path_index_sts1", "first_path_index_sts2"))
-        capture = dataclasses.replace(capture, radar=radar, **absent)
-    return capture if truth else dataclasses.replace(capture, truth=None)
+        samples: dict[str, Any] = dict.fromkeys(("sts1", "sts2", "first_path_index_sts1", "first_path_index_sts2"))
+        capture = on_radar(capture, radar, **samples)
+    absent: dict[str, Any] = {name: None for name, there in (("truth", truth), ("background", background)) if not there}
+    return dataclasses.replace(capture, **absent) if absent else capture
 
 
 def frames_of(capture: Capture) -> Frames:
@@ -77,14 +81,7 @@ def cut(block: Block, start: int, stop: int) -> Block:
     start, stop : int
         First frame, and the one after the last, counted from the start of the block.
     """
-    rows = block.rows
-    parts = {
-        name: value[start:stop]
-        for name in ("first_path", "noise_rms", "profile")
-        if (value := getattr(block, name)) is not None
-    }
-    kept = block.detections.take((rows >= start) & (rows < stop))
-    return block.replace(frames=block.frames.part(start, stop), detections=kept, **parts)
+    return block.cut(start, stop)
 
 
 def pieces(block: Block, cuts: Sequence[int]) -> list[Block]:

@@ -12,7 +12,7 @@ import numpy as np
 from uwbbench.api.capture import Capture
 from uwbbench.api.case import NotApplicable
 from uwbbench.api.errors import UwbbenchError
-from uwbbench.measure.robustness.scene import altered, approach, chosen
+from uwbbench.measure.robustness.scene import altered, approach, chosen, on_radar
 from uwbbench.tools.check.check import Nonconformity, check
 from uwbbench.tools.check.inputs import FRAMES
 from uwbbench.tools.check.stage_subject import StageSubject, behind_all
@@ -101,7 +101,7 @@ def _on_other_radar(subject: StageSubject, **changes: Any) -> str:
     """Say how the stage takes to another radar: it works, or refuses in ``open`` with a message for users."""
     usual = subject.capture
     capture = _with_taps(usual, changes.get("taps", usual.radar.taps))
-    capture = dataclasses.replace(capture, radar=dataclasses.replace(capture.radar, **changes))
+    capture = on_radar(capture, dataclasses.replace(capture.radar, **changes))
     try:
         block = subject.declared(behind_all(capture, subject.cls.consumes))
     except UwbbenchError as error:
@@ -115,13 +115,15 @@ def _on_other_radar(subject: StageSubject, **changes: Any) -> str:
 
 
 def _with_taps(capture: Capture, taps: int) -> Capture:
-    """Capture whose frames end after some taps."""
+    """Capture whose frames, and those of its background, end after some taps."""
     parts: dict[str, Any] = {
         name: np.asarray(samples)[:, :taps]
         for name in ("preamble", "sts1", "sts2")
         if (samples := getattr(capture, name)) is not None
     }
-    return dataclasses.replace(capture, radar=dataclasses.replace(capture.radar, taps=taps), **parts)
+    background = None if capture.background is None else _with_taps(capture.background, taps)
+    radar = dataclasses.replace(capture.radar, taps=taps)
+    return dataclasses.replace(capture, radar=radar, background=background, **parts)
 
 
 @check(_RADAR)

@@ -13,13 +13,13 @@ from uwbbench.tools.check.check import Nonconformity, check
 from uwbbench.tools.check.stage_subject import PARTS, StageSubject, lacking
 from uwbbench.tools.check.values import Values, difference, of_blocks
 
-NEEDS = ("sts", "truth", "first_path")
+NEEDS = ("sts", "truth", "first_path", "background")
 _STAGE = "uwbbench.api.stage.Stage"
 
 
 @check(_STAGE)
 def ports_are_sets_of_names(subject: StageSubject) -> str:
-    """Ports are frozen sets of text, made with ``ports``, and what is needed of a capture is among three names."""
+    """Ports are frozen sets of text, made with ``ports``, and what is needed of a capture is among four names."""
     for attribute in ("consumes", "produces", "removes", "needs"):
         value = getattr(subject.cls, attribute)
         if not isinstance(value, frozenset) or not all(isinstance(port, str) for port in value):

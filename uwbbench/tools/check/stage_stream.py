@@ -31,6 +31,18 @@ def open_starts_anew(subject: StageSubject) -> None:
     same(subject.usual, subject.run(subject.block, stage=stage), "after open what a fresh instance gives")
 
 
+@check("uwbbench.api.stage.Stage.show_background")
+def background_may_come_in_blocks(subject: StageSubject) -> str:
+    """The background, which is shown block by block, gives the same bits however it is cut."""
+    if "background" not in subject.cls.needs:
+        raise NotApplicable("the stage needs no background")
+    for name, cuts in CUTS.items():
+        stage = subject.opened()
+        subject.reopen(stage, cuts=cuts)
+        same(subject.usual, subject.run(subject.block, stage=stage), f"with it in {name} what it gives as a whole")
+    return f"{len(CUTS)} cuts"
+
+
 @check("uwbbench.api.stage.Stage.open")
 def instances_share_nothing(subject: StageSubject) -> None:
     """Two instances that are stepped by turns give what each alone gives: no state on the class or the module."""
@@ -107,6 +119,7 @@ def no_frames_are_fine(subject: StageSubject) -> None:
 CHECKS = (
     stream_equals_batch,
     open_starts_anew,
+    background_may_come_in_blocks,
     instances_share_nothing,
     no_frames_are_fine,
     no_rows_are_fine,

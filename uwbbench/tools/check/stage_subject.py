@@ -19,13 +19,21 @@ from uwbbench.api.detections import Detections
 from uwbbench.api.errors import UwbbenchError
 from uwbbench.api.registry import AuthoredKind
 from uwbbench.api.stage import Stage
+from uwbbench.api.weights import load_weights
 from uwbbench.tools.check.check import Nonconformity
 from uwbbench.tools.check.inputs import frames_of, pieces, usual_capture
 from uwbbench.tools.check.params import working_params
 from uwbbench.tools.check.subject import ClassSubject
 from uwbbench.tools.check.values import Values, of_blocks
 
-PARTS = {"first_path": "first_path", "noise": "noise_rms", "profile": "profile"}
+PARTS = {
+    "first_path": "first_path",
+    "noise": "noise_rms",
+    "profile": "profile",
+    "aligned": "aligned",
+    "window_mean": "window_mean",
+    "window_sd": "window_sd",
+}
 """Attribute of a block behind each port that is one."""
 
 
@@ -52,12 +60,25 @@ class StageSubject(ClassSubject):
         self.reopen(stage, capture)
         return stage
 
-    def reopen(self, stage: Stage[Any], capture: Capture | None = None) -> None:
-        """Start a stream as a pipeline does."""
+    def reopen(self, stage: Stage[Any], capture: Capture | None = None, cuts: Sequence[int] = ()) -> None:
+        """Start a stream as a pipeline does.
+
+        Parameters
+        ----------
+        stage : Stage
+        capture : Capture, optional
+            The usual one if left out.
+        cuts : sequence of int
+            Frames, ascending, before which its background is cut.
+        """
         capture = capture or self.capture
+        load_weights(stage, capture.radar)
         stage.open(capture.radar)
         if "truth" in self.cls.needs and capture.truth is not None:
             stage.show_truth(capture.truth, capture.trajectory)
+        if "background" in self.cls.needs and capture.background is not None:
+            background = self.declared(behind_all(capture.background, self.cls.consumes))
+            stage.show_background(iter(pieces(background, cuts)))
 
     @cached_property
     def full_block(self) -> Block:
@@ -97,7 +118,10 @@ class StageSubject(ClassSubject):
         """Arrays of the usual block."""
         block = self.block
         arrays = {f"frames.{name}": value for name, value in vars(block.frames).items()}
-        arrays |= {name: getattr(block, name) for name in PARTS.values()}
+        for name in PARTS.values():
+            part = getattr(block, name)
+            plain = part is None or isinstance(part, np.ndarray)
+            arrays |= {name: part} if plain else {f"{name}.{key}": value for key, value in vars(part).items()}
         arrays |= {f"detections.{name}": column for name, column in block.detections.columns.items()}
         return {name: value for name, value in arrays.items() if isinstance(value, np.ndarray)}
 
@@ -199,9 +223,10 @@ def _through(name: str, block: Block, made: frozenset[str], capture: Capture) ->
     """Block behind one stage, where the capture and the block have all that it takes; else as before."""
     cls = registry.load_plugin("stages", name)
     lacks_sts = "sts" in cls.needs and not capture.radar.has_sts
-    if lacks_sts or "truth" in cls.needs or cls.consumes - made:
+    if lacks_sts or cls.needs & {"truth", "background"} or cls.consumes - made:
         return block, made
     stage: Stage[Any] = cls(working_params(cls.params_type(), {}, f"stage '{name}'", name))
+    load_weights(stage, capture.radar)
     stage.open(capture.radar)
     parts = [stage.step(block)]
     tail = stage.flush()

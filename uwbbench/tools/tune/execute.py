@@ -123,7 +123,7 @@ def tune(tuning: Tuning, progress: Progress = lambda _: None) -> TuneOutcome:
 
 def variant(tuning: Tuning, values: Mapping[str, Any]) -> Pipeline:
     """Detector of a tuning with some values changed, by path."""
-    data = with_values(tuning.detector.to_dict(), values, tuning.name)
+    data = with_values(tuning.detector.here(), values, tuning.name)
     return Pipeline(check_detector(data, YamlFile(tuning.name, data, {})))
 
 

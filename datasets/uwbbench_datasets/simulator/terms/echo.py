@@ -157,7 +157,7 @@ class PointEcho(_Echo[PointParams]):
         back = np.linalg.norm(body.center_m - view.receiver_m, axis=1)
         scale = view.radar.wavelength_m * np.sqrt(self.params.rcs_m2) / (4 * np.pi) ** 1.5
         amplitude = scale / np.maximum(out * back, 1e-6)
-        points = np.broadcast_to(body.center_m, (len(view), 1, 3))
+        points = np.broadcast_to(body.center_m[..., None, :], (len(view), 1, 3))
         return points, amplitude[:, None]
 
 

@@ -38,7 +38,7 @@ def hidden(view: View) -> BoolArray:
     for column, body in enumerate(view.objects):
         point = nearest_on_outline(receiver, opaque[column])
         for other, outline in zip(view.objects, opaque, strict=True):
-            if other is not body and len(outline) > 1:
+            if other is not body and outline.shape[-2] > 1:
                 blocked[:, column] |= segments_cross(receiver, point, outline)
                 blocked[:, column] |= segments_cross(transmitter, point, outline)
     return blocked

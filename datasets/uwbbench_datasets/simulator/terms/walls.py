@@ -86,6 +86,7 @@ class WallClutter(Term[ClutterParams]):
     """
 
     shared = True
+    of_place = True
     _scatterers: list[tuple[int, Face, FloatArray, ComplexArray]]
 
     def prepare(self, view: View, rng: np.random.Generator) -> View:
