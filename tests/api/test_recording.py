@@ -38,7 +38,7 @@ def test_receivers_of_a_simulated_run_are_one_recording_and_runs_are_several():
     dataset = open_dataset("simulated", {"scenes": ["two-plates"], "set": changes, "runs": 2}, [])
     recordings = [dataset.open(name).recording for name in dataset.names()[:4]]
     assert recordings[0] == recordings[1] != recordings[2] == recordings[3]
-    assert recordings[0].endswith("/1 [scene seed 1, run 1]")
+    assert recordings[0].endswith("/1 [draws 30aa4635cc15e65a]")
 
 
 def test_scenes_with_one_seed_leak_and_the_seed_of_a_dataset_tells_them_apart():

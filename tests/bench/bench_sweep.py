@@ -16,7 +16,7 @@ from harness import Disagreement, Effort, Row, Run, at_least, at_most, interleav
 
 from uwbbench.api import Capture, FloatArray
 from uwbbench.detect.pipeline import Pipeline, load_detector
-from uwbbench.measure.accuracy.judge import ScoringRules
+from uwbbench.measure.accuracy.rules import ScoringRules
 from uwbbench.tools.tune.sweep.scores import SetScores, set_scores
 from uwbbench.tools.tune.sweep.sweep import Sweep, Swept
 

@@ -114,6 +114,7 @@ def test_of_several_receivers_one_is_chosen(uwbbench, two_receivers: Path, detec
     assert found["latency_us"]["n"] == 39
 
 
+@pytest.mark.slow
 def test_score_json_is_pure_in_a_real_process(
     shell: Callable[..., subprocess.CompletedProcess[str]], capture: Path, detector: Path
 ) -> None:

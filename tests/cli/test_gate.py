@@ -198,6 +198,7 @@ def test_a_detector_that_crashes_is_invalid_for_every_check(uwbbench, make_gate,
     assert all("the worker ended (exit code 7)" in check["reason"] for check in told["checks"])
 
 
+@pytest.mark.slow
 def test_the_same_detector_is_no_worse_than_its_stored_run_and_a_worse_one_is(uwbbench, make_gate, stored_run) -> None:
     rule = "[{metric: f1, scoring: frame, no_worse_than: stored, detector: paper-filtering}]"
     make_gate(accuracy=rule)

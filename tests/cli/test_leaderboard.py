@@ -35,6 +35,7 @@ def after(ran, before: Path) -> Path:
     return Path(shutil.copytree(ran("after", EXPERIMENT, deaf) / "after", before.parent / "after"))
 
 
+@pytest.mark.slow
 def test_verify_says_what_was_checked(uwbbench, before: Path) -> None:
     assert uwbbench("verify", "before").stdout.startswith("before: verified (")
     found = json.loads(uwbbench("verify", "before", "--json").stdout)

@@ -148,6 +148,7 @@ def test_progress_is_shown_on_a_terminal_and_stdout_stays_pure(experiment: Path,
     assert leaderboard(printed.decode())
 
 
+@pytest.mark.slow
 def test_interrupting_a_run_keeps_what_is_finished(experiment: Path, capture: Path, tmp_path: Path) -> None:
     for copy in range(20):
         (tmp_path / f"copy-{copy}.h5").write_bytes(capture.read_bytes())

@@ -81,6 +81,7 @@ def test_a_failure_is_exit_code_1_and_explained(uwbbench, broken) -> None:
     assert "Traceback" in uwbbench(*words, "--traceback", code=1).stdout
 
 
+@pytest.mark.slow
 def test_json_stays_json_while_a_plugin_prints(uwbbench, broken) -> None:
     found = json.loads(uwbbench("check", "broken", "--json", code=1).stdout)
     assert found[0]["error"] > 10

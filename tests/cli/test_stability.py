@@ -28,6 +28,7 @@ def test_all_cases_are_told_for_people(uwbbench) -> None:
         assert line in out
 
 
+@pytest.mark.slow
 def test_json_holds_the_figures_and_every_case(uwbbench) -> None:
     found = json.loads(uwbbench("stability", "-d", "cfar-os", "--json").stdout)
     assert found["detector"] == "cfar-os"

@@ -9,6 +9,7 @@ from uwbbench.tools import warmup
 APPROACH = "approach[approach-ch9-metal-1]"
 
 
+@pytest.mark.slow
 def test_json_holds_every_number_and_every_call(uwbbench, capture, detector) -> None:
     words = ("time", capture, "-d", detector, "-d", "null", "--reference", "null", "--json")
     found = json.loads(uwbbench(*words, "--paced", 0.2, "--rate-hz", 100, "--blocks", 40).stdout)

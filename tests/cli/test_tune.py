@@ -10,6 +10,8 @@ import yaml
 
 from uwbbench.detect.pipeline import load_detector
 
+pytestmark = pytest.mark.slow
+
 TUNE = """\
 schema: 1
 detector: paper
@@ -44,7 +46,6 @@ def file(tmp_path: Path) -> Path:
     return path
 
 
-@pytest.mark.slow
 def test_a_tuning_leaves_detectors_all_sets_manifest_and_summary(uwbbench, file, tmp_path):
     printed = uwbbench("tune", file, "-o", "tuned").stdout
     folder = tmp_path / "tuned"
@@ -63,7 +64,6 @@ def test_a_tuning_leaves_detectors_all_sets_manifest_and_summary(uwbbench, file,
     assert "| concrete | 9 |" in (folder / "summary.md").read_text()
 
 
-@pytest.mark.slow
 def test_tuned_thresholds_are_a_detector_that_can_be_run_and_tells_what_it_was_tuned_on(uwbbench, file, tmp_path):
     result = json.loads(uwbbench("tune", file, "-o", "tuned", "--json").stdout)
     group = result["groups"][0]

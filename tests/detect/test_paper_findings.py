@@ -18,6 +18,8 @@ from uwbbench.config.detector import read_detector
 from uwbbench.config.source import open_dataset
 from uwbbench.detect.pipeline import Pipeline
 
+pytestmark = pytest.mark.slow
+
 Floats = NDArray[np.float64]
 NEAR_M, MID_M, FAR_M = (0.6, 0.8), (1.0, 1.5), (2.8, 3.4)
 ALL_PEAKS = {"pipeline.select.strongest.use": "select.all"}
@@ -82,7 +84,6 @@ def found_share(material: str, channel: int, span_m: tuple[float, float]) -> flo
     return hits / frames
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("channel", [5, 9])
 @pytest.mark.parametrize("material", ["metal", "concrete", "plywood"])
 def test_prominence_falls_with_distance_beyond_the_ringing(material: str, channel: int) -> None:

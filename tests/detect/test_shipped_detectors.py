@@ -11,13 +11,12 @@ from hypothesis import strategies as st
 from threadpoolctl import threadpool_limits
 
 from tests.fixtures.chance import seed
+from tests.fixtures.shipped import NAMES, ON_A_PLATE
 from uwbbench import load_detector
 from uwbbench.api import Capture, ConfigError, Detections
-from uwbbench.api.locate import shipped
 from uwbbench.config.source import open_dataset
 from uwbbench.measure.accuracy.scoring import Region, score
 
-NAMES = sorted(shipped("detectors"))
 FRAMES = 150
 EXPECTED = {
     "paper",
@@ -31,6 +30,7 @@ EXPECTED = {
     "background-mean",
     "background-ema",
     "background-svd",
+    "entropy",
     "null",
     "constant",
     "oracle",
@@ -70,7 +70,7 @@ def test_every_detector_says_what_it_is(name):
 
 
 @pytest.mark.parametrize("sts", [True, False])
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", ON_A_PLATE)
 def test_every_detector_runs_and_looks_at_every_frame(name, sts):
     found = whole_run(name, sts)
     np.testing.assert_array_equal(found.processed, np.arange(FRAMES))
@@ -78,7 +78,7 @@ def test_every_detector_runs_and_looks_at_every_frame(name, sts):
 
 
 @pytest.mark.parametrize("sts", [True, False])
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", ON_A_PLATE)
 @given(cuts=st.lists(st.integers(0, FRAMES), max_size=12))
 @example(cuts=list(range(1, FRAMES)))
 @settings(max_examples=3, deadline=None)
@@ -242,6 +242,7 @@ def rail(data_dir):
     return dataset.open(dataset.names()[0])
 
 
+@pytest.mark.slow
 @pytest.mark.data
 @pytest.mark.parametrize(
     ("name", "changes"),
@@ -263,6 +264,7 @@ def test_two_strongest_detections_find_the_reflectors_of_the_measured_rail(name,
     assert filtering.chance_recall < 0.25
 
 
+@pytest.mark.slow
 @pytest.mark.data
 @pytest.mark.parametrize(
     ("name", "least_tree", "least_walk"),

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from uwbbench.api import Block, Frames, Radar, Stage
+from uwbbench.api.block import PER_FRAME
 from uwbbench.api.registry import load_plugin
 
 Maker = Callable[..., Any]
@@ -51,22 +52,11 @@ def build_stage(name: str, **params: Any) -> Stage[Any]:
     return cls(cls.params_type().model_validate(params))
 
 
-def cut_block(block: Block, start: int, stop: int) -> Block:
-    """Rows ``start`` to ``stop`` of a block, with their detections."""
-    rows = block.rows
-    parts = {
-        name: None if (value := getattr(block, name)) is None else value[start:stop]
-        for name in ("first_path", "noise_rms", "profile")
-    }
-    inside = (rows >= start) & (rows < stop)
-    return block.replace(frames=block.frames.part(start, stop), detections=block.detections.take(inside), **parts)
-
-
 def run(stage: Stage[Any], radar: Radar, block: Block, cuts: Sequence[int] = ()) -> Block:
     """All that a stage yields for a block handed over in pieces, the flush included."""
     stage.open(radar)
     edges = [0, *sorted(cuts), len(block.frames)]
-    yielded = [stage.step(cut_block(block, start, stop)) for start, stop in pairwise(edges)]
+    yielded = [stage.step(block.cut(start, stop)) for start, stop in pairwise(edges)]
     tail = stage.flush()
     return Block.join([*yielded, *([] if tail is None else [tail])])
 
@@ -75,11 +65,16 @@ def assert_same(one: Block, other: Block) -> None:
     """Bit-equal samples, levels, profiles and detections."""
     np.testing.assert_array_equal(one.frames.index, other.frames.index)
     np.testing.assert_array_equal(one.frames.preamble, other.frames.preamble)
-    for name in ("first_path", "noise_rms", "profile"):
-        if getattr(one, name) is None:
-            assert getattr(other, name) is None
-        else:
-            np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
+    for name in PER_FRAME:
+        ours, theirs = getattr(one, name), getattr(other, name)
+        assert (ours is None) == (theirs is None)
+        if name == "aligned" and ours is not None:
+            ours, theirs = ours.magnitude, theirs.magnitude
+        if name.startswith("window") and ours is not None:
+            assert ours.refused == theirs.refused
+            ours, theirs = ours.of_frames, theirs.of_frames
+        if ours is not None:
+            np.testing.assert_array_equal(ours, theirs)
     assert one.detections.columns.keys() == other.detections.columns.keys()
     for name, column in one.detections.columns.items():
         np.testing.assert_array_equal(column, other.detections.columns[name])

@@ -46,6 +46,7 @@ def test_a_leaderboard_compares_its_detectors_in_pairs(made, cautious):
     assert {"difference", "low", "high", "p_adjusted"} <= set(pairs)
 
 
+@pytest.mark.slow
 def test_a_leaderboard_writes_its_site(made, tmp_path):
     board = uwbbench.leaderboard([made], tmp_path / "site")
     assert "SIMULATED" in (tmp_path / "site" / "index.html").read_text()

@@ -14,6 +14,8 @@ from uwbbench.run.folder import RunFolder
 from uwbbench.show.text.error_sheets import cause_sheets, main_causes
 from uwbbench.show.text.report import Tables
 
+pytestmark = pytest.mark.slow
+
 BOARD = ("plates", "simulated", "object", "filtering")
 
 

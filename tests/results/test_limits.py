@@ -71,6 +71,7 @@ def test_the_bound_has_the_tabulated_values(snr_db: float, expected_cm: float) -
     assert 100 * cramer_rao_range_m(snr_db) == pytest.approx(expected_cm, abs=0.006)
 
 
+@pytest.mark.slow
 def test_no_detector_beats_the_bound_where_all_echoes_are_found(report: Report) -> None:
     table = report.limits.accuracy
     assert table["detector"].tolist() == ["paper-subsample", "background-mean"]

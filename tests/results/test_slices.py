@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from uwbbench.api.metric import Outcome
+from uwbbench.measure.accuracy.metrics.choice import MetricChoice
 from uwbbench.measure.accuracy.metrics.detection import Recall
 from uwbbench.measure.accuracy.stats import estimated
 from uwbbench.results.results import Scored
@@ -53,7 +54,9 @@ ALL_OF_THEM = [
 def made(members: list[Scored]) -> dict[tuple[str, str, str], Any]:
     board = ("s", "simulated", "frame", "filtering")
     known = {(board, "d"): {"recall": estimated(Recall, [one.outcome for one in members])}}
-    found = slices(members, {"recall": Recall}, range_edges_m(members), SETTINGS, known)
+    found = slices(
+        members, MetricChoice({"rank": "recall", "table": ["recall"]}), range_edges_m(members), SETTINGS, known
+    )
     return {(one.channel, one.material, one.span): one for one in found}
 
 

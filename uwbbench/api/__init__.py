@@ -9,6 +9,7 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from uwbbench.api.aligned import AlignedProfile, Bins, WindowProfile
     from uwbbench.api.arrays import BoolArray, ComplexArray, FloatArray, IntArray
     from uwbbench.api.block import Block
     from uwbbench.api.capture import Capture, CaptureHeader, Samples, analytic
@@ -43,20 +44,23 @@ if TYPE_CHECKING:
         wrap_angle,
     )
     from uwbbench.api.kernel import Kernel
+    from uwbbench.api.learning import Assessed, Example, LearnedParams, Trainable, Weights, expect_arrays
     from uwbbench.api.locate import find_config
     from uwbbench.api.metric import Metric, Outcome
     from uwbbench.api.numba_internals import as_tuple
+    from uwbbench.api.outcomes import PresenceOutcome, SegmentOutcome, TrackOutcome
     from uwbbench.api.override import with_values
     from uwbbench.api.radar import CHANNEL_CENTER_HZ, Radar
     from uwbbench.api.recording import leak_key, leaks, simulated_recording
     from uwbbench.api.registry import load_plugin
-    from uwbbench.api.stage import Filter, P, Params, Stage, ports
+    from uwbbench.api.stage import Fidelity, Filter, P, Params, Stage, ports
     from uwbbench.api.term import EchoFading, EchoTail, Paths, Pulse, Responses, SceneObject, Term, View
     from uwbbench.api.trial import StagesOnTrial, exact_ulps
     from uwbbench.api.truth import Obstacle, Sight, Trajectory, Truth
     from uwbbench.api.yaml_file import YamlFile, read_yaml
 
 _HOME = {
+    "aligned": ("AlignedProfile", "Bins", "WindowProfile"),
     "arrays": ("BoolArray", "ComplexArray", "FloatArray", "IntArray"),
     "block": ("Block",),
     "capture": ("Capture", "CaptureHeader", "Samples", "analytic"),
@@ -83,14 +87,16 @@ _HOME = {
         "wrap_angle",
     ),
     "kernel": ("Kernel",),
+    "learning": ("Assessed", "Example", "LearnedParams", "Trainable", "Weights", "expect_arrays"),
     "locate": ("find_config",),
     "metric": ("Metric", "Outcome"),
     "numba_internals": ("as_tuple",),
+    "outcomes": ("PresenceOutcome", "SegmentOutcome", "TrackOutcome"),
     "override": ("with_values",),
     "radar": ("CHANNEL_CENTER_HZ", "Radar"),
     "recording": ("leak_key", "leaks", "simulated_recording"),
     "registry": ("load_plugin",),
-    "stage": ("Filter", "P", "Params", "Stage", "ports"),
+    "stage": ("Fidelity", "Filter", "P", "Params", "Stage", "ports"),
     "term": ("EchoFading", "EchoTail", "Paths", "Pulse", "Responses", "SceneObject", "Term", "View"),
     "trial": ("StagesOnTrial", "exact_ulps"),
     "truth": ("Obstacle", "Sight", "Trajectory", "Truth"),
@@ -102,6 +108,9 @@ __all__ = [
     "CHANNEL_CENTER_HZ",
     "COLUMNS",
     "SPEED_OF_LIGHT_M_S",
+    "AlignedProfile",
+    "Assessed",
+    "Bins",
     "Block",
     "BoolArray",
     "Capture",
@@ -117,11 +126,14 @@ __all__ = [
     "EchoFading",
     "EchoTail",
     "Evidence",
+    "Example",
+    "Fidelity",
     "Filter",
     "FloatArray",
     "Frames",
     "IntArray",
     "Kernel",
+    "LearnedParams",
     "Limit",
     "LimitFilter",
     "Metric",
@@ -132,6 +144,7 @@ __all__ = [
     "Params",
     "Paths",
     "PluginError",
+    "PresenceOutcome",
     "Pulse",
     "Radar",
     "RankFilter",
@@ -140,16 +153,21 @@ __all__ = [
     "Samples",
     "SceneObject",
     "ScoringError",
+    "SegmentOutcome",
     "Sight",
     "Stage",
     "StagesOnTrial",
     "StoreError",
     "Term",
+    "TrackOutcome",
+    "Trainable",
     "Trajectory",
     "Truth",
     "UwbbenchError",
     "View",
     "Violation",
+    "Weights",
+    "WindowProfile",
     "YamlFile",
     "analytic",
     "as_tuple",
@@ -160,6 +178,7 @@ __all__ = [
     "compiled",
     "direction",
     "exact_ulps",
+    "expect_arrays",
     "find_config",
     "hard_case",
     "inlined",

@@ -7,10 +7,14 @@ from typing import Any
 
 import numpy as np
 
+from uwbbench.api.aligned import AlignedProfile, WindowProfile
 from uwbbench.api.arrays import FloatArray, IntArray
 from uwbbench.api.detections import Detections
 from uwbbench.api.errors import PluginError
 from uwbbench.api.frames import Frames
+
+PER_FRAME = ("first_path", "noise_rms", "profile", "aligned", "window_mean", "window_sd")
+"""Parts of a block that have a row for each frame."""
 
 
 @dataclass(frozen=True)
@@ -29,7 +33,11 @@ class Block:
     profile : (frames, taps - profile_start) array or None
         The real-valued curve that detectors search. Port ``profile``.
     profile_start : int
-        Tap of the first column of ``profile``.
+        Tap of the first column of ``profile``, whose columns are taps of the frame.
+    aligned : AlignedProfile or None
+        Magnitudes that count from the first path, on bins of their own. Port ``aligned``.
+    window_mean, window_sd : WindowProfile or None
+        Mean and standard deviation of aligned magnitudes over windows of frames. Ports of the same names.
     detections : Detections
         Rows so far; may hold rows of earlier frames behind a stage that delays them. Port ``detections``.
     """
@@ -39,6 +47,9 @@ class Block:
     noise_rms: FloatArray | None = None
     profile: FloatArray | None = None
     profile_start: int = 0
+    aligned: AlignedProfile | None = None
+    window_mean: WindowProfile | None = None
+    window_sd: WindowProfile | None = None
     detections: Detections = field(default_factory=Detections.empty)
 
     def replace(self, **parts: Any) -> Block:
@@ -66,12 +77,36 @@ class Block:
         PluginError
             If no stage has produced it: the asking stage does not declare what it consumes.
         """
+        return np.asarray(self._known(name))
+
+    @property
+    def aligned_profile(self) -> AlignedProfile:
+        """``aligned``, known to be there; raises as :meth:`part` does."""
+        aligned: AlignedProfile = self._known("aligned")
+        return aligned
+
+    def windows(self, name: str) -> WindowProfile:
+        """``window_mean`` or ``window_sd``, known to be there; raises as :meth:`part` does."""
+        windows: WindowProfile = self._known(name)
+        return windows
+
+    def _known(self, name: str) -> Any:
         value = getattr(self, name)
         if value is None:
             raise PluginError(
                 f"a stage uses '{name}', which no earlier stage has produced; it must declare that it consumes it"
             )
-        return np.asarray(value)
+        return value
+
+    def cut(self, start: int, stop: int) -> Block:
+        """Frames ``start`` to ``stop`` of this block, with all that is known of them and their detections."""
+        rows = self.rows
+        parts: dict[str, Any] = {
+            name: value[start:stop] for name in PER_FRAME if (value := getattr(self, name)) is not None
+        }
+        if len(rows):
+            parts["detections"] = self.detections.take((rows >= start) & (rows < stop))
+        return self.replace(frames=self.frames.part(start, stop), **parts)
 
     @staticmethod
     def join(blocks: list[Block]) -> Block:
@@ -80,16 +115,14 @@ class Block:
             return blocks[0]
         first = blocks[0]
 
-        def stacked(name: str) -> FloatArray | None:
-            if getattr(first, name) is None:
+        def stacked(name: str) -> Any:
+            parts = [getattr(block, name) for block in blocks]
+            if parts[0] is None:
                 return None
-            return np.concatenate([getattr(block, name) for block in blocks])
+            return np.concatenate(parts) if isinstance(parts[0], np.ndarray) else type(parts[0]).join(parts)
 
-        return Block(
+        return first.replace(
             frames=Frames.join([block.frames for block in blocks]),
-            first_path=stacked("first_path"),
-            noise_rms=stacked("noise_rms"),
-            profile=stacked("profile"),
-            profile_start=first.profile_start,
             detections=Detections.join([block.detections for block in blocks]),
+            **{name: stacked(name) for name in PER_FRAME},
         )

@@ -8,7 +8,7 @@ from typing import Literal
 from uwbbench.api import registry
 from uwbbench.api.errors import ConfigError, PluginError, nearest
 
-Folder = Literal["detectors", "experiments", "suites", "scenes", "robots", "gates", "tuning", "fits"]
+Folder = Literal["detectors", "experiments", "suites", "scenes", "robots", "gates", "tuning", "training", "fits"]
 
 _PACKAGE = Path(__file__).resolve().parent.parent
 
@@ -34,7 +34,7 @@ def find_config(folder: Folder, name: str, relative_to: Path | None = None) -> P
 
     Parameters
     ----------
-    folder : {"detectors", "experiments", "suites", "scenes", "robots", "gates", "tuning", "fits"}
+    folder : {"detectors", "experiments", "suites", "scenes", "robots", "gates", "tuning", "training", "fits"}
         Kind of config; suites are experiments, and are found among them.
     name : str
         A path (ends in ``.yaml`` or ``.yml``, or holds a separator), a shipped name, or for detectors a name that a

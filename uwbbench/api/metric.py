@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar, Literal, TypeVar
 
@@ -16,6 +17,9 @@ _Value = TypeVar("_Value", float, FloatArray)
 @dataclass(frozen=True)
 class Outcome:
     """Result of matching one detector's output on one capture against the truth, in one scoring; read-only.
+
+    A scoring that knows more has a subclass with further arrays, and says in ``per_frame`` and ``per_item`` what they
+    are of: a capture is cut into blocks by these alone.
 
     Attributes
     ----------
@@ -33,7 +37,15 @@ class Outcome:
         Time covered by the scored frames.
     exhaustive : bool
         False where an unmatched detection proves nothing: precision is then undefined.
+    per_frame : tuple of str
+        Arrays whose first axis is the scored frames.
+    per_item : mapping of str to tuple of str
+        Arrays whose first axis is items of another kind, such as detections, by the array that names each item's row
+        among the scored frames.
     """
+
+    per_frame: ClassVar[tuple[str, ...]] = ("group", "tp", "fp", "fn")
+    per_item: ClassVar[Mapping[str, tuple[str, ...]]] = {"error_frame": ("error_m", "matched")}
 
     group: IntArray
     tp: IntArray
@@ -46,7 +58,9 @@ class Outcome:
     exhaustive: bool = True
 
     def __post_init__(self) -> None:
-        lock_fields(self, ("group", "tp", "fp", "fn", "error_frame", "error_m", "matched"))
+        lock_fields(self, self.per_frame)
+        for row, names in self.per_item.items():
+            lock_fields(self, (row, *names))
 
 
 class Metric:
@@ -62,6 +76,9 @@ class Metric:
 
     Attributes
     ----------
+    of : type of Outcome
+        Outcomes that it takes: :class:`Outcome`, which every scoring has, or what some scorings alone have. In tables
+        of other scorings it has no column.
     title : str
         What people call it; empty: the name under which it is registered.
     unit : str
@@ -86,7 +103,8 @@ class Metric:
         Whether a default one also stands in tables that must be narrow: in the terminal, and by channel and material.
     headline : int or None
         Place among the few default ones that are charted; the first three of them are compared in pairs, and the first
-        that can ranks. None: not among them. Listed ones always are, and come first.
+        that can ranks. Of equal ones those come first that only this scoring has. None: not among them. Listed ones
+        always are, and come first.
     kind : {"share", "ratio", "mean", "quantile", "positive", "other"}
         Which interval it has. A share (0...1), a ratio that is never negative, such as a mean absolute error or a rate,
         or a mean of either sign is a ratio of sums, whose ``parts`` it must give. A quantile, at ``level``, is that of
@@ -95,6 +113,7 @@ class Metric:
         Of a quantile: 0.95 for the 95th percentile.
     """
 
+    of: ClassVar[type[Outcome]] = Outcome
     title: ClassVar[str] = ""
     unit: ClassVar[str] = ""
     shown_as: ClassVar[tuple[str, float, int] | None] = None

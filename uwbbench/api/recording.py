@@ -2,11 +2,13 @@
 
 A recording is all that receivers have seen of one run. A simulated one is as much its random draws: noise, sampling
 grid and gain follow from the seed and the number of the run, whatever scene they are added to, so that two scenes with
-equal seeds are no independent samples. Its name ends in brackets with what the draws follow from, and these decide.
+equal seeds are no independent samples. Its name ends in brackets with a mark of the draws, and this decides. The mark
+is a hash: seeds may be secret.
 """
 
 from __future__ import annotations
 
+import hashlib
 import re
 
 _DRAWS = re.compile(r" \[(.+)\]$")
@@ -25,20 +27,20 @@ def simulated_recording(name: str, draws: str) -> str:
     Examples
     --------
     >>> simulated_recording("walker/2", "scene seed 1, run 2")
-    'walker/2 [scene seed 1, run 2]'
+    'walker/2 [draws 70a54e96dee3c25a]'
     """
-    return f"{name} [{draws}]"
+    return f"{name} [draws {hashlib.sha256(draws.encode()).hexdigest()[:16]}]"
 
 
 def leak_key(recording: str) -> str:
     """Part of a recording's name that is the same for all recordings which leak into each other.
 
-    It is what the random draws follow from of a simulated recording, and the whole name of any other.
+    It is the mark of the draws of a simulated recording, and the whole name of any other.
 
     Examples
     --------
-    >>> leak_key("walker/2 [scene seed 1, run 2]"), leak_key("corridor-monday")
-    ('scene seed 1, run 2', 'corridor-monday')
+    >>> leak_key("walker/2 [draws 70a54e96dee3c25a]"), leak_key("corridor-monday")
+    ('draws 70a54e96dee3c25a', 'corridor-monday')
     """
     draws = _DRAWS.search(recording)
     return draws[1] if draws else recording
@@ -49,7 +51,7 @@ def leaks(one: str, other: str) -> bool:
 
     Examples
     --------
-    >>> leaks("walker/2 [scene seed 1, run 2]", "room/2 [scene seed 1, run 2]")
+    >>> leaks("walker/2 [draws 70a54e96dee3c25a]", "room/2 [draws 70a54e96dee3c25a]")
     True
     """
     return leak_key(one) == leak_key(other)

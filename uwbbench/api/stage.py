@@ -51,8 +51,8 @@ class Stage(Generic[P]):
     consumes : frozenset of str
         Ports that an earlier stage must have produced.
     produces : frozenset of str
-        Ports that later stages may use: ``first_path``, ``noise``, ``profile``, ``detections``, or the name of a
-        column of detections.
+        Ports that later stages may use: ``first_path``, ``noise``, ``profile``, ``aligned``, ``window_mean``,
+        ``window_sd``, ``detections``, or the name of a column of detections.
     removes : frozenset of str
         Ports that are gone behind this stage, for example ``frames`` where detections are held back.
     needs : frozenset of str

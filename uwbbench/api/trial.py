@@ -16,6 +16,7 @@ from uwbbench.api.case import NotApplicable
 from uwbbench.api.frames import Frames
 from uwbbench.api.radar import Radar
 from uwbbench.api.stage import Stage
+from uwbbench.api.weights import load_weights
 
 RADAR = Radar(
     model="synthetic",
@@ -71,6 +72,7 @@ class StagesOnTrial:
         for use, params in self._uses:
             if _is(use, name):
                 stage = _made(use, {**params, **changes})
+                load_weights(stage, radar)
                 stage.open(radar)
                 return stage
         raise NotApplicable(f"the detector has no stage '{name}'")

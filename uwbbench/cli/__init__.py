@@ -29,6 +29,7 @@ from uwbbench.cli import (
     stability,
     suite,
     time,
+    train,
     tune,
     warmup,
 )
@@ -91,6 +92,7 @@ for _group in (
     evaluate,
     time,
     tune,
+    train,
     fit,
     gate,
     inspection,

@@ -18,6 +18,9 @@ class Scoring(StrEnum):
     PEAK = "peak"
     OBJECT = "object"
     LATEST = "latest"
+    TRACK = "track"
+    SEGMENT = "segment"
+    PRESENCE = "presence"
 
 
 class Surface(StrEnum):

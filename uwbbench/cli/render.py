@@ -70,11 +70,17 @@ def print_scores(result: Mapping[str, Any]) -> None:
     name = marked(result["detector"], results_file=result["results_file"] is not None)
     typer.echo(f"{name} on {label} '{result['capture']}', {result['frames']} frames")
     tables = [name for name in ("filtering", "mapping") if result[name] is not None]
-    rows = [[title, *cells] for title, cells in _scores([result[name] for name in tables])]
+    rows = [[title, *cells] for title, cells in _scores([result[name] for name in tables], result["scoring"])]
     title = f"scoring '{result['scoring']}', gate {result['gate_m']:g} m"
     print_table(title, ["", *(f"after {name}" for name in tables)], rows)
     if result["mapping"] is None:
-        typer.echo("after mapping: n/a (the detector does not cluster positions)")
+        reasons = {
+            "track": "the tracks have no positions",
+            "segment": "segments have no positions",
+            "presence": "presence has no positions",
+        }
+        why = reasons.get(result["scoring"], "the detector does not cluster positions")
+        typer.echo(f"after mapping: n/a ({why})")
     times = result["latency_us"]
     if times is not None:
         shown = [
@@ -92,13 +98,13 @@ def print_scores(result: Mapping[str, Any]) -> None:
 _TIMES = ("p50", "p90", "p95", "p99", "amortised", "deadline", "step_p50")
 
 
-def _scores(blocks: Sequence[Mapping[str, Any]]) -> Iterator[tuple[str, list[str]]]:
+def _scores(blocks: Sequence[Mapping[str, Any]], scoring: str) -> Iterator[tuple[str, list[str]]]:
     """Title of each score, and its text in each table."""
     from uwbbench.measure.accuracy.metrics.choice import MetricChoice
-    from uwbbench.run.folder.scored import column_of
+    from uwbbench.measure.accuracy.scoring import column_of
     from uwbbench.show.text.quantity import Quantity
 
-    for name, metric in MetricChoice().items():
+    for name, metric in MetricChoice((), [scoring]).items():
         key, by = column_of(name, metric.unit), Quantity.of(name, metric)
         if all(key in block for block in blocks):  # those of other packages are known to experiments only
             texts = [None if block[key] is None else by.text(block[key]) for block in blocks]
@@ -139,6 +145,7 @@ def print_report(report: Report) -> None:
 
 def print_leaderboard(report: Report) -> None:
     """Print how the detectors did on each dataset, best first, and what did not work."""
+    from uwbbench.results.verdicts import BOUNDS
     from uwbbench.show.text.quantity import Quantity, undefined_titles
     from uwbbench.show.text.report import Tables
     from uwbbench.show.text.wording import set_aside_warning
@@ -148,29 +155,36 @@ def print_leaderboard(report: Report) -> None:
         for note in sheet.notes:
             typer.echo(f"  {note}")
         typer.echo()
-    main = report.metrics.ranking(exhaustive=all(about["exhaustive"] for about, _ in report.estimates))
-    brief = Quantity.of_all(report.metrics.brief).items()
-    quantities = dict(sorted(brief, key=lambda item: item[0] != main))  # the one that ranks, and the time beside it
-    groups: dict[str, list[list[str]]] = {}
+    exhaustive = all(about["exhaustive"] for about, _ in report.estimates)
+    groups: dict[tuple[str, tuple[str, ...]], list[list[str]]] = {}
     open_world: set[str] = set()
+    bounded: set[str] = set()
     for about, estimates in report.estimates:
         if about["dataset"] in report.limits.datasets:  # test signals have the tables above, and no leader
             continue
         title = f"{about['dataset']}, {about['source'].upper()}"
         if not about["exhaustive"]:
             open_world.add(title)
+        if about["bound"]:
+            bounded.add(title)
+        metrics = report.metrics.of(about["scoring"])
+        main = metrics.ranking(exhaustive=exhaustive)  # the one that ranks comes first, and the time beside it
+        brief = Quantity.of_all(metrics.brief).items()
+        quantities = dict(sorted(brief, key=lambda item: item[0] != main))
         numbers = [number(estimates[name].value, by.digits, by.factor) for name, by in quantities.items()]
         numbers.insert(1, time_us(about, "p50_us"))
         numbers.append(number(about["chance_recall"], 3))
         label = report.label(about["detector"])
-        groups.setdefault(title, []).append([about["scoring"], about["table"], label, *numbers])
-    heads = [by.axis for by in quantities.values()]
-    columns = ["scoring", "after", "detector", heads[0], "p50 (us)", *heads[1:], "chance recall"]
-    for title, rows in groups.items():
+        heads = tuple(by.axis for by in quantities.values())
+        groups.setdefault((title, heads), []).append([about["scoring"], about["table"], label, *numbers])
+    for (title, heads), rows in groups.items():
+        columns = ["scoring", "after", "detector", heads[0], "p50 (us)", *heads[1:], "chance recall"]
         shown = slice(None) if title in open_world else slice(-1)
         print_table(title, columns[shown], [row[shown] for row in rows])
         if any(not math.isnan(about["p50_us"]) for about, _ in report.estimates):
             typer.echo(f"  p50: median time of a frame, {report.timed}, on this machine only")
+        if title in bounded:
+            typer.echo(f"  {BOUNDS}")
         if title in open_world:
             missing = undefined_titles(report.metrics)
             typer.echo(f"  truth not exhaustive: no {missing}; errors are of matches; compare recall with chance")

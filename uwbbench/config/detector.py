@@ -18,6 +18,8 @@ from uwbbench.api.locate import find_config
 from uwbbench.api.override import with_values
 from uwbbench.api.yaml_file import YamlFile, parse_yaml, read_yaml
 from uwbbench.config.extends import extended
+from uwbbench.config.reported import ReportedFigures
+from uwbbench.config.weights import anchored_weights, portable_weights
 
 BY_CHANNEL = "by_channel"
 """Key of a parameter whose value depends on the capture's channel: ``{by_channel: {5: 1.0, 9: 0.2, other: 0.2}}``."""
@@ -46,6 +48,9 @@ class DetectorModel(BaseModel):
     description: str = ""
     citation: str = ""
     fidelity: Literal["from-source", "reconstruction", "baseline", "reference"] = "baseline"
+    reported: list[ReportedFigures] = Field(
+        default_factory=list, description="What the source of the method reports of it; no part of the detector."
+    )
     score: str | None = Field(
         None,
         description="Column that orders its candidates in curves without a threshold, larger first; the first of "
@@ -114,6 +119,8 @@ class DetectorConfig:
     results : Path or None
         Folder in which another program has stored what it found; there are no steps then, and ``fidelity`` says so.
         What is in it counts, not where it is: it is no part of the resolved file.
+    reported : tuple of ReportedFigures
+        What the source of the method reports of it; no part of the resolved file either.
     """
 
     name: str
@@ -123,6 +130,7 @@ class DetectorConfig:
     fidelity: str = "baseline"
     score: str = ""
     results: Path | None = field(default=None, compare=False)
+    reported: tuple[ReportedFigures, ...] = field(default=(), compare=False)
 
     @classmethod
     def of_results(cls, name: str, folder: Path) -> DetectorConfig:
@@ -131,6 +139,10 @@ class DetectorConfig:
 
     def to_dict(self) -> dict[str, Any]:
         """Resolved file as plain values: what a manifest stores and an identity is made of."""
+        return portable_weights(self.here())
+
+    def here(self) -> dict[str, Any]:
+        """Resolved file as plain values that another process on this machine can read, files that it names included."""
         steps = [{"use": s.use, "as": s.label, "params": s.params, "optional": s.optional} for s in self.steps]
         score = {"score": self.score} if self.score else {}
         return {"schema": 1, "name": self.name, "fidelity": self.fidelity, **score, "pipeline": steps}
@@ -138,6 +150,9 @@ class DetectorConfig:
 
 KERNEL = "kernel "
 """What the names of kernels begin with among the names of sources."""
+
+REFERENCE = "reference"
+"""Fidelity of what stands beside detectors for comparison."""
 
 RESULTS_FILE = "results file"
 """Fidelity of a detector that is known by what it has written alone, and how tables mark its rows."""
@@ -151,9 +166,30 @@ def from_results(config: Mapping[str, Any]) -> bool:
     return bool(config.get("fidelity") == RESULTS_FILE)
 
 
-def marked(name: str, *, results_file: bool) -> str:
-    """Name of a detector as tables show it, which say so where its rows are read from a file."""
-    return f"{name} ({RESULTS_FILE})" if results_file else name
+BOUND = "bound"
+"""How tables mark the rows of what is no detector, but bounds what detectors can reach."""
+
+
+def is_bound(config: DetectorConfig) -> bool:
+    """Whether it only bounds what detectors can reach: it or a stage of it is a reference, or reads the truth."""
+    stages = [registry.load_plugin("stages", step.use) for step in config.steps]
+    seeing = any("truth" in stage.needs or stage.fidelity == REFERENCE for stage in stages)
+    return seeing or config.fidelity == REFERENCE
+
+
+def marked(name: str, *, results_file: bool = False, bound: bool = False) -> str:
+    """Name of a detector as tables show it.
+
+    Parameters
+    ----------
+    name : str
+    results_file : bool
+        Whether its rows are read from a file.
+    bound : bool
+        Whether it bounds what detectors can reach, and is none.
+    """
+    marks = [*([RESULTS_FILE] if results_file else []), *([BOUND] if bound else [])]
+    return f"{name} ({', '.join(marks)})" if marks else name
 
 
 def detector_identity(config: Mapping[str, Any], sources: Mapping[str, str]) -> str:
@@ -199,16 +235,16 @@ def read_detector(
     """
     path = find_config("detectors", name, relative_to)
     source = read_yaml(path)
-    data = extended(source, "detectors", path)
+    data = anchored_weights(extended(source, "detectors", path, anchored_weights), path.parent)
     if changes:
-        data = with_values(data, changes, "--set")
+        data = anchored_weights(with_values(data, changes, "--set"), relative_to or Path())
     return check_detector(data, source)
 
 
 def detector_from_text(text: str, name: str = "detector") -> DetectorConfig:
     """Detector from YAML text, as :func:`read_detector` does from a file."""
     source = parse_yaml(text, name)
-    return check_detector(extended(source, "detectors"), source)
+    return check_detector(anchored_weights(extended(source, "detectors", None, anchored_weights), Path()), source)
 
 
 def check_detector(data: Mapping[str, Any], source: YamlFile) -> DetectorConfig:
@@ -228,15 +264,21 @@ def check_detector(data: Mapping[str, Any], source: YamlFile) -> DetectorConfig:
         _check_params(step, source, index)
         steps.append(step)
     steps = _completed(steps)
+    for place, figures in enumerate(model.reported):
+        for at, name in enumerate(figures.metrics):
+            if name not in registry.entries("metrics"):
+                where = source.place(("reported", place, "metrics", at))
+                raise ConfigError(f"{where}: no metric '{name}'.{nearest(name, registry.entries('metrics'))}")
     _check_score(model.score, steps, source)
     about = model.description, model.citation, model.fidelity
-    return DetectorConfig(model.name, tuple(steps), *about, model.score or "")
+    return DetectorConfig(model.name, tuple(steps), *about, model.score or "", reported=tuple(model.reported))
 
 
 def _check_score(score: str | None, steps: list[Step], source: YamlFile) -> None:
     """Check that a step makes the column that orders candidates."""
     made = {port for step in steps for port in registry.load_plugin("stages", step.use).produces}
-    columns = sorted(made - {"first_path", "noise", "profile", "detections", "cluster"})
+    parts = {"first_path", "noise", "profile", "aligned", "window_mean", "window_sd", "detections", "cluster"}
+    columns = sorted(made - parts)
     if score is not None and score not in columns:
         known = f"{nearest(score, columns)} They make: {', '.join(columns) or 'no column'}"
         raise ConfigError(f"{source.place(('score',))}: no step makes the column '{score}'.{known}")

@@ -25,7 +25,7 @@ def read_given(folder: Folder, given: Given) -> tuple[Path, YamlFile]:
 
     Parameters
     ----------
-    folder : {"detectors", "experiments", "suites", "scenes", "robots", "gates", "tuning", "fits"}
+    folder : {"detectors", "experiments", "suites", "scenes", "robots", "gates", "tuning", "training", "fits"}
         Kind of configuration.
     given : str, Path or mapping
         A mapping has the keys of the file; ``schema`` may be left out, as it is of this version. It is named after its

@@ -9,8 +9,8 @@ from pydantic import Discriminator, Field, Tag, ValidationInfo, field_validator
 
 from uwbbench.config.model import ConfigModel
 
-Scoring = Literal["frame", "peak", "object", "latest"]
-"""What counts as one chance to be right: a frame, a peak, an object in a frame, or the latest answer at a frame."""
+Scoring = Literal["frame", "peak", "object", "latest", "track", "segment", "presence"]
+"""What counts as one chance to be right: a frame, a peak, an object in a frame, the latest answer, a track, ..."""
 
 Table = Literal["filtering", "mapping"]
 """After which half of a detector: its filters, or its clustering."""
@@ -51,7 +51,7 @@ class RegionModel(ConfigModel):
 
     @property
     def limits(self) -> dict[str, Any]:
-        """Values of a :class:`~uwbbench.measure.accuracy.judge.Region`, in metres and radians."""
+        """Values of a :class:`~uwbbench.measure.accuracy.region.Region`, in metres and radians."""
         limits = {"min_range_m": self.min_range_m, "max_range_m": self.max_range_m}
         return {**limits, "half_angle_rad": self.half_angle_rad}
 

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from uwbbench.api.block import Block
 from uwbbench.api.capture import Capture, CaptureHeader
 from uwbbench.api.frames import BATCH_FRAMES
+from uwbbench.api.radar import Radar
 from uwbbench.api.stage import Params, Stage
 from uwbbench.api.truth import Truth
 from uwbbench.detect.stream import Opened, Stream
@@ -26,11 +27,14 @@ class Chosen:
     stage : type
     params : Params
         Checked parameters for the capture's channel.
+    load : callable
+        Gives a new stage, of that label, what it has learned for the radar that it will be opened on.
     """
 
     label: str
     stage: type[Stage[Any]]
     params: Params
+    load: Callable[[Stage[Any], str, Radar], None]
 
 
 def background_of(capture: CaptureHeader) -> Capture | None:
@@ -53,6 +57,7 @@ def opened(steps: Sequence[Chosen], capture: CaptureHeader, background: Capture 
     stages: list[Opened] = []
     for place, step in enumerate(steps):
         stage = step.stage(step.params)
+        step.load(stage, step.label, capture.radar)
         stage.open(capture.radar)
         if "truth" in step.stage.needs and capture.truth is not None:
             stage.show_truth(capture.truth, capture.trajectory)

@@ -17,8 +17,12 @@ from uwbbench.api.detections import COLUMNS, Detections
 from uwbbench.api.errors import ConfigError, PluginError
 from uwbbench.api.frames import BATCH_FRAMES
 from uwbbench.api.kernel import Kernel
+from uwbbench.api.learning import Trainable
+from uwbbench.api.radar import Radar
 from uwbbench.api.stage import Stage
-from uwbbench.config.detector import KERNEL, DetectorConfig, detector_from_text, detector_identity, read_detector
+from uwbbench.api.weights import load_weights
+from uwbbench.config.detector import KERNEL, DetectorConfig, Step, detector_from_text, detector_identity, read_detector
+from uwbbench.config.weights import portable_weights
 from uwbbench.detect.hand_out import with_hand_outs
 from uwbbench.detect.opening import Chosen, background_of, opened
 from uwbbench.detect.sources import source_hash
@@ -108,8 +112,8 @@ class Pipeline:
             steps = _fused(steps, notes, threads)
         return Stream(steps, notes, audit=audit)
 
-    def _opened(self, capture: CaptureHeader) -> tuple[list[Opened], list[str]]:
-        """The stages, opened on the receiver, and what a reader of the results must know of them."""
+    def _opened(self, capture: CaptureHeader, until: str | None = None) -> tuple[list[Opened], list[str]]:
+        """The stages, up to the step ``until``, opened on the receiver, and what a reader of the results must know."""
         radar, background = capture.radar, background_of(capture)
         counted_from_transmission = radar.first_tap_delay_s is not None
         has = {
@@ -127,7 +131,7 @@ class Pipeline:
         notes: list[str] = []
         missing: dict[str, str] = {}  # port that a step left out would have made: what the capture lacks for it
         left_out: dict[str, list[str]] = {}
-        for step in self.config.steps:
+        for step in self._steps(until):
             cls = registry.load_plugin("stages", step.use)
             params, fallen = step.params_for(radar.channel)
             if step.implied_by:
@@ -145,10 +149,39 @@ class Pipeline:
             if lacks:
                 where = f"detector '{self.name}', step '{step.label}'"
                 raise ConfigError(f"{where}: capture '{capture.name}' has no {', no '.join(lacks)}")
-            chosen.append(Chosen(step.label, cls, cls.params_type().model_validate(params)))
+            chosen.append(Chosen(step.label, cls, cls.params_type().model_validate(params), self._load_weights))
             available = (available - cls.removes) | cls.produces
         notes += [f"left out, as the capture has no {reason}: {', '.join(names)}" for reason, names in left_out.items()]
         return opened(chosen, capture, background), notes
+
+    def _steps(self, until: str | None) -> tuple[Step, ...]:
+        """The steps before one, by its label; all where None."""
+        steps = self.config.steps
+        return steps if until is None else steps[: [step.label for step in steps].index(until)]
+
+    def _load_weights(self, stage: Stage[Any], label: str, radar: Radar) -> None:
+        if not isinstance(stage, Trainable):
+            return
+        try:
+            load_weights(stage, radar, self.steps_before(label, radar.channel))
+        except ConfigError as error:
+            raise ConfigError(f"detector '{self.name}', step '{label}': {error}") from None
+
+    def steps_before(self, label: str, channel: int | None) -> list[dict[str, Any]]:
+        """``use`` and ``params`` of each step before one, with all parameters as they are on a channel.
+
+        Parameters
+        ----------
+        label : str
+            Of the step.
+        channel : int or None
+        """
+        steps = []
+        for step in self._steps(label):
+            model = registry.load_plugin("stages", step.use).params_type()
+            params = model.model_validate(step.params_for(channel)[0]).model_dump(mode="json")
+            steps.append({"use": step.use, "params": params})
+        return list(portable_weights({"pipeline": steps})["pipeline"])
 
     def run(
         self,
@@ -209,10 +242,26 @@ class Pipeline:
         Block
             Frames without clutter, ``first_path``, ``noise_rms`` and ``profile``, as far as the detector makes them.
         """
-        steps, _ = self._opened(capture)
-        first = next(place for place, step in enumerate(steps) if "detections" in step.stage.produces)
-        stream = Stream(steps[:first], [])
-        for frames in capture.blocks(BATCH_FRAMES):
+        steps = self.config.steps
+        maker = next(step for step in steps if "detections" in registry.load_plugin("stages", step.use).produces)
+        return self.arriving(capture, maker.label)
+
+    def arriving(self, capture: Capture, label: str) -> Iterator[Block]:
+        """Blocks as a step finds them; neither it nor those behind it are opened.
+
+        Parameters
+        ----------
+        capture : Capture
+        label : str
+            Of the step.
+
+        Yields
+        ------
+        Block
+        """
+        steps, _ = self._opened(capture, label)
+        stream = Stream(steps, [])
+        for frames in capture.blocks(BATCH_FRAMES, sts="sts" in stream.needs):
             yield stream.through(Block(frames.without_invalid()))
         yield from stream.tails()
 

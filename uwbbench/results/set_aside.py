@@ -12,8 +12,9 @@ from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from uwbbench.measure.accuracy.judge import Scene, judge
+from uwbbench.measure.accuracy.judge import judge
 from uwbbench.measure.accuracy.metrics.detection import FalseAlarmsPerMinute, Precision
+from uwbbench.measure.accuracy.scene import Scene
 from uwbbench.measure.accuracy.scoring import ScoringRules
 from uwbbench.measure.accuracy.stats import evaluate
 from uwbbench.results.results import Scored

@@ -21,6 +21,7 @@ import numpy as np
 
 from uwbbench.api.arrays import FloatArray
 from uwbbench.api.metric import Metric, Outcome
+from uwbbench.measure.accuracy.metrics.choice import MetricChoice
 from uwbbench.measure.accuracy.stats import Estimate, estimated, evaluate, samples_behind, subset
 from uwbbench.results.results import Scored, errors_in, scenes_of
 
@@ -91,7 +92,7 @@ def span_name(near_m: float, far_m: float) -> str:
 
 def slices(
     scored: Sequence[Scored],
-    metrics: Mapping[str, type[Metric]],
+    metrics: MetricChoice,
     edges_m: FloatArray,
     settings: Mapping[str, Any],
     known: Mapping[tuple[Board, str], Mapping[str, Estimate]],
@@ -101,8 +102,7 @@ def slices(
     Parameters
     ----------
     scored : sequence of Scored
-    metrics : mapping of str to type of Metric
-        By name.
+    metrics : MetricChoice
     edges_m : (bins + 1,) array
     settings : mapping
         ``confidence`` of the intervals.
@@ -132,7 +132,7 @@ def slices(
                         name: _bare(metric, outcomes, scenes)
                         if several
                         else estimated(metric, outcomes, scenes, confidence=settings["confidence"])
-                        for name, metric in metrics.items()
+                        for name, metric in metrics.of(board[2]).items()
                     }
                 frames = sum(len(outcome.group) for outcome in outcomes)
                 hits = sum(int(outcome.tp.sum()) for outcome in outcomes)

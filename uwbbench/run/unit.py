@@ -19,8 +19,8 @@ from uwbbench.config.source import CaptureRef
 from uwbbench.detect.pipeline import Pipeline
 from uwbbench.detect.results_file import ResultsFile
 from uwbbench.detect.results_folder import ResultsFolder
-from uwbbench.measure.accuracy.judge import Scene
 from uwbbench.measure.accuracy.ranked import RankedCounts, ranked
+from uwbbench.measure.accuracy.scene import Scene
 from uwbbench.measure.accuracy.scoring import ScoringRules
 from uwbbench.run.folder.identity import accuracy_identity
 from uwbbench.run.folder.journal import Entry, Status
@@ -186,7 +186,7 @@ def _detected(job: Job) -> Finished:
         scores=rows,
         facts=facts,
     )
-    kept = detections.candidates if any(rule.scoring == "peak" for rule in job.rules) else None
+    kept = detections.candidates if any(rule.scoring in ("peak", "presence") for rule in job.rules) else None
     return Finished(
         entry=entry,
         found=_bare(detections),

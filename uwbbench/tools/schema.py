@@ -18,6 +18,7 @@ from uwbbench.config.detector import BY_CHANNEL, DetectorModel, StepModel
 from uwbbench.run.experiment import ExperimentModel, ScoredDataset
 from uwbbench.tools.fit.config import FitModel
 from uwbbench.tools.gate.config import GateModel
+from uwbbench.tools.train.config import TrainModel
 from uwbbench.tools.tune.config import TuneModel
 
 Schema = dict[str, Any]
@@ -48,6 +49,11 @@ def gate_schema() -> Schema:
 def tuning_schema() -> Schema:
     """JSON Schema of a tuning file; each dataset's parameters follow from its ``use``."""
     return _file_schema(TuneModel, DatasetUse, "datasets", by_channel=False)
+
+
+def training_schema() -> Schema:
+    """JSON Schema of a training file; each dataset's parameters follow from its ``use``."""
+    return _file_schema(TrainModel, DatasetUse, "datasets", by_channel=False)
 
 
 def fit_schema() -> Schema:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
-from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any, ClassVar
@@ -71,8 +69,7 @@ class Simulated(Dataset[SimulatedParams]):
         """The scene with the dataset's seed, from which each scene and variant draws otherwise."""
         if self.params.seed is None:
             return scene
-        number = hashlib.sha256(f"{self.params.seed} {scene.name}".encode()).digest()[:16]
-        return replace(scene, model=scene.model.model_copy(update={"seed": int.from_bytes(number)}))
+        return scene.seeded(self.params.seed)
 
     def runs(self) -> list[str]:
         """Names of the runs, each of which holds all receivers: ``scene/variant/run``."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import itertools
 import zlib
 from collections.abc import Callable, Mapping
@@ -11,7 +12,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import ConfigDict, Field, model_validator
+from pydantic import ConfigDict, Field, field_validator, model_validator
 
 from uwbbench.api import (
     ConfigError,
@@ -94,6 +95,17 @@ class SceneModel(SceneNames):
     draw: dict[str, Annotated[list[float], Field(min_length=2, max_length=2)]] = Field(
         default_factory=dict, description="Values by path that each run draws anew, evenly between two ends."
     )
+    draw_seed: int | None = Field(
+        None,
+        ge=0,
+        description="Of these draws, in place of 'seed': a run's values are then the same in all variants, each of "
+        "which has noise of its own.",
+    )
+
+    @field_validator("objects", mode="before")
+    @classmethod
+    def _without_nulls(cls, value: Any) -> Any:
+        return [one for one in value if one is not None] if isinstance(value, list) else value
 
     @model_validator(mode="after")
     def _names_differ(self) -> SceneModel:
@@ -139,6 +151,16 @@ class Scene:
     robot: str = ""
     source: YamlFile = field(default_factory=lambda: YamlFile("scene", {}, {}), repr=False, compare=False)
 
+    def seeded(self, seed: int) -> Scene:
+        """The scene with draws that follow from a number, those of each variant from another one.
+
+        What ``draw_seed`` decides follows from it too, alike for all variants of a file.
+        """
+        seeds = {"seed": _number(seed, self.name)}
+        if self.model.draw_seed is not None:
+            seeds["draw_seed"] = _number(seed, f"draw {self.name.partition('/')[0]} {self.model.draw_seed}")
+        return replace(self, model=self.model.model_copy(update=seeds))
+
     def of_run(self, run: int) -> Scene:
         """The scene with what a run draws anew; each path has a random stream of its own.
 
@@ -150,10 +172,12 @@ class Scene:
         if not self.model.draw:
             return self
         drawn = {}
+        seed = self.model.seed if self.model.draw_seed is None else self.model.draw_seed
         for path, (low, high) in self.model.draw.items():
-            stream = np.random.SeedSequence(self.model.seed, spawn_key=(run, zlib.crc32(path.encode())))
+            stream = np.random.SeedSequence(seed, spawn_key=(run, zlib.crc32(path.encode())))
             drawn[path] = float(np.random.Generator(np.random.SFC64(stream)).uniform(low, high))
-        data = with_values(self.source.data, {**drawn, "seed": self.model.seed}, self.source.place(("draw",)))
+        seeds = {"seed": self.model.seed, "draw_seed": self.model.draw_seed}
+        data = with_values(self.source.data, {**drawn, **seeds}, self.source.place(("draw",)))
         robot_named = partial(read_robot, folder=self.folder, place=self.source.place(("robot",)))
         return _scene(self.name, data, self.source, self.folder, robot_named)
 
@@ -165,6 +189,11 @@ class Scene:
     def radar(self, receiver: str) -> Radar:
         """Radar of one receiver."""
         return self.model.radar.radar(receiver, self.model.receivers[receiver])
+
+
+def _number(seed: int, text: str) -> int:
+    """Seed that follows from another one and a name."""
+    return int.from_bytes(hashlib.sha256(f"{seed} {text}".encode()).digest()[:16])
 
 
 def read_scenes(path: Path, changes: Mapping[str, Any] | None = None) -> list[Scene]:
@@ -199,7 +228,10 @@ def read_scenes(path: Path, changes: Mapping[str, Any] | None = None) -> list[Sc
         variant = with_values(data, chosen, source.place(("vary",))) if chosen else data
         parts = [f"{labels[key]}-{_text(vary[key], value)}" for key, value in chosen.items()]
         whole = "/".join([name, *(["_".join(parts)] if parts else [])])
-        scenes.append(_scene(whole, variant, source, path.parent, robot_named))
+        scene = _scene(whole, variant, source, path.parent, robot_named)
+        if scene.model.draw_seed is not None:  # equal noise in two variants would tell one by the other
+            scene = replace(scene, model=scene.model.model_copy(update={"seed": _number(scene.model.seed, whole)}))
+        scenes.append(scene)
         scenes[-1].of_run(1)  # so that a path that leads nowhere is found before anything is simulated
     return scenes
 
@@ -238,7 +270,9 @@ def _short_names(paths: list[str]) -> dict[str, str]:
 
 
 def _text(values: list[Any], value: Any) -> str:
-    """Value as part of a name; its number in the list where it is no single value."""
+    """Value as part of a name: an object's own name, or the number in the list, where it is no single value."""
+    if isinstance(value, dict) and isinstance(value.get("id"), str):
+        return str(value["id"])
     return str(values.index(value) + 1) if isinstance(value, list | dict) else str(value).replace("/", "-")
 
 

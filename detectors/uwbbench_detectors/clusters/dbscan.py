@@ -83,7 +83,7 @@ class Dbscan(Stage[DbscanParams]):
     consumes = ports("detections", "x_m", "y_m")
     produces = ports("cluster")
     # Detections may come out long after their frames, so nothing that counts frames can follow.
-    removes = ports("frames", "first_path", "noise", "profile")
+    removes = ports("frames", "first_path", "noise", "profile", "aligned", "window_mean", "window_sd")
     fidelity = "from-source"
 
     def open(self, radar: Radar) -> None:

@@ -143,3 +143,18 @@ class RangeFilter(LimitFilter[RangeFilterParams]):
         "minimum_m": Limit("range_m", "least"),
         "maximum_m": Limit("range_m", "most"),
     }
+
+
+class ProbabilityFilterParams(Params):
+    """Least probability."""
+
+    minimum: float = Field(
+        0.5, ge=0, le=1, description="Where the classes of the examples counted alike, 0.5 makes both errors alike."
+    )
+
+
+class ProbabilityFilter(LimitFilter[ProbabilityFilterParams]):
+    """Keep what is probable enough, such as the frames in which a classifier takes something to be there."""
+
+    consumes: ClassVar[frozenset[str]] = ports("detections", "probability")
+    limits: ClassVar[Mapping[str, Limit]] = {"minimum": Limit("probability", "least")}

@@ -101,7 +101,8 @@ class MinMaxProfile(Stage[MinMaxProfileParams]):
         """Block with the profile, or an empty one where frames are held back."""
         if self.params.scope == "recording":
             self._held.append(block)
-            return self._scaled(_emptied(block), np.zeros(0), np.zeros(0))
+            nothing = block.cut(0, 0).replace(detections=Detections.empty())
+            return self._scaled(nothing, np.zeros(0), np.zeros(0))
         amplitude = block.frames.amplitude
         ruling = amplitude if self.params.scope == "frame_all_taps" else amplitude[:, self.start :]
         return self._scaled(block, ruling.min(axis=1), ruling.max(axis=1))
@@ -126,13 +127,3 @@ class MinMaxProfile(Stage[MinMaxProfileParams]):
         profile = np.zeros(kept.shape)
         profile[varies] = (kept[varies] - lowest[varies, None]) / span[varies, None]
         return block.replace(profile=profile, profile_start=self.start)
-
-
-def _emptied(block: Block) -> Block:
-    """The block's parts without any frame."""
-    return block.replace(
-        frames=block.frames.part(0, 0),
-        first_path=None if block.first_path is None else block.first_path[:0],
-        noise_rms=None if block.noise_rms is None else block.noise_rms[:0],
-        detections=Detections.empty(),
-    )

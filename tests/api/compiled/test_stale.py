@@ -12,6 +12,7 @@ from tests.api.compiled.conftest import SOURCE, VALUES, imported, kept
 from uwbbench.api import compiled_files
 
 
+@pytest.mark.slow
 def test_a_changed_source_is_compiled_again_and_what_was_kept_of_it_removed(source: Path, fresh) -> None:
     imported(source).total(VALUES)
     old = kept(source.parent / "__pycache__")

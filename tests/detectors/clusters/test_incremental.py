@@ -37,6 +37,7 @@ cuts = st.lists(st.integers(0, 400), max_size=8)
 min_samples = st.integers(1, 25)
 
 
+@pytest.mark.slow
 @given(seed=st.integers(0, 10**6), count=st.integers(1, 400), min_samples=min_samples, cuts=cuts)
 @settings(max_examples=80, deadline=None)
 def test_blobs_in_noise(seed, count, min_samples, cuts):
@@ -47,6 +48,7 @@ def test_blobs_in_noise(seed, count, min_samples, cuts):
     check_after_every_batch(points, 0.2, min_samples, cuts)
 
 
+@pytest.mark.slow
 @given(
     seed=st.integers(0, 10**6),
     count=st.integers(1, 300),

@@ -7,6 +7,9 @@ from uwbbench.api.capture import CaptureHeader
 
 WINDOW_M, RATE_HZ, GATE_M = 10.0, 10.0, 0.2
 
+OF_DETECTIONS = ("frame", "peak", "object", "latest")
+"""Scorings of detections, whatever columns these have besides their range."""
+
 
 def capture_of(*objects, frames=4, exhaustive=True, has_sts=False, position_m=None, yaw_rad=None):
     """Capture of a receiver at the origin that looks along +x, unless it is told to move."""

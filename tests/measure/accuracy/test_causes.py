@@ -8,16 +8,18 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests.detect.test_shipped_detectors import NAMES, plate
+from tests.detect.test_shipped_detectors import plate
+from tests.fixtures.shipped import WITH_RANGES
 from tests.measure.accuracy.test_scoring import capture_of, found_in, post
 from uwbbench import load_detector
 from uwbbench.api import SPEED_OF_LIGHT_M_S, Detections, Obstacle
 from uwbbench.config.rules import Table
 from uwbbench.measure.accuracy.causes import KINDS, NOT_KNOWN, Causes, causes
 from uwbbench.measure.accuracy.echoes import covered_m, excess_m, ghosts_m, window_m
-from uwbbench.measure.accuracy.judge import SCORINGS, Scene, ScoringRules, judge
+from uwbbench.measure.accuracy.judge import judge, tables_of
 from uwbbench.measure.accuracy.region import Region
-from uwbbench.measure.accuracy.scoring import tables_of
+from uwbbench.measure.accuracy.rules import ScoringRules
+from uwbbench.measure.accuracy.scene import Scene
 
 FRAMES = 4
 
@@ -145,12 +147,12 @@ def test_excess_paths_are_those_of_the_simulated_echoes():
     assert covered_m(capture.radar, 2) == pytest.approx(2 * SPEED_OF_LIGHT_M_S / capture.radar.bandwidth_hz)
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", WITH_RANGES)
 def test_causes_add_up_for_every_shipped_detector(name):
     capture = plate()
     found = load_detector(name).run(capture, candidates=True)
-    for scoring in sorted({*SCORINGS} - {"latest"}):
-        for table in tables_of(found):
+    for scoring in ("frame", "object", "peak"):
+        for table in tables_of(found, scoring):
             made = explained(found, capture, scoring, table)
             assert NOT_KNOWN not in made.misses
             named = {cause.removeprefix("dropped by ") for cause in made.misses if cause.startswith("dropped by ")}

@@ -9,12 +9,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests.measure.accuracy.scenes import GATE_M, WINDOW_M, at_once, capture_of, post
+from tests.measure.accuracy.scenes import GATE_M, OF_DETECTIONS, WINDOW_M, at_once, capture_of, post
 from uwbbench.api import Detections, Obstacle
 from uwbbench.measure.accuracy.matching import match
 from uwbbench.measure.accuracy.metrics.detection import Precision, Recall
 from uwbbench.measure.accuracy.metrics.error import MeanAbsoluteError, StandardDeviation
-from uwbbench.measure.accuracy.scoring import SCORINGS, Region, ScoringRules, outcomes, score
+from uwbbench.measure.accuracy.scoring import Region, ScoringRules, outcomes, score
 from uwbbench.measure.accuracy.stats import evaluate
 
 GOLDEN = json.loads((Path(__file__).parent / "golden" / "plate_post_wall.json").read_text())
@@ -44,7 +44,7 @@ def golden_detections():
     return at_once(placed(frame, range_m, azimuth_deg, amplitude, cluster, candidates=placed(*more)))
 
 
-@pytest.mark.parametrize("scoring", SCORINGS)
+@pytest.mark.parametrize("scoring", OF_DETECTIONS)
 def test_scores_of_the_golden_scene_are_those_found_by_hand(scoring):
     scene = GOLDEN["scene"]
     capture = capture_of(
@@ -101,7 +101,7 @@ def scenes(draw, exhaustive=None):
 
 
 @settings(max_examples=120, deadline=None)
-@given(scenes(), st.sampled_from(SCORINGS), st.sampled_from([None, 1, 2]))
+@given(scenes(), st.sampled_from(OF_DETECTIONS), st.sampled_from([None, 1, 2]))
 def test_every_retained_detection_is_counted_once(scene, scoring, strongest):
     found, capture = scene
     scores = score(found, capture, scoring, strongest=strongest)
@@ -130,7 +130,7 @@ def test_recall_of_peaks_is_never_below_that_of_frames(scene, strongest):
 
 
 @settings(max_examples=60, deadline=None)
-@given(scenes(), st.sampled_from(SCORINGS), st.data())
+@given(scenes(), st.sampled_from(OF_DETECTIONS), st.data())
 def test_two_halves_of_a_capture_merge_to_the_whole(scene, scoring, data):
     found, capture = scene
     frames = len(capture)
@@ -191,7 +191,7 @@ def test_object_scoring_finds_as_many_pairs_as_matching_each_frame_alone(scene):
     assert (block.tp, block.fn) == (pairs, visible_count - pairs)
 
 
-@pytest.mark.parametrize("scoring", SCORINGS)
+@pytest.mark.parametrize("scoring", OF_DETECTIONS)
 def test_a_detector_that_knows_the_truth_scores_one_with_no_error(scoring):
     objects = (post(2), post(4, 1), post(5, -2, structure=True))
     capture = capture_of(*objects, frames=100)

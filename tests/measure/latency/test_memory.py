@@ -36,6 +36,7 @@ def patient(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(memory, "LIMIT_S", math.inf)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("patient")
 def test_what_a_stream_keeps_of_each_frame_is_found(approach: Capture) -> None:
     found = memory.growth(Keeping(4000), approach, received(approach, 40))  # type: ignore[arg-type]

@@ -53,6 +53,7 @@ def test_every_call_of_the_paced_pass_is_stored(folder: RunFolder) -> None:
     assert entry.facts["paced"]["p50_us"] == pytest.approx(np.median(times_us))
 
 
+@pytest.mark.slow
 def test_runs_of_earlier_versions_are_still_reported(folder: RunFolder, tmp_path: Path) -> None:
     earlier = RunFolder(shutil.copytree(folder.path, tmp_path / "earlier"))
     journal = earlier.path / "journal.jsonl"
@@ -79,6 +80,7 @@ def test_runs_of_earlier_versions_are_still_reported(folder: RunFolder, tmp_path
     assert np.array_equal(earlier.step_times_us(unit), earlier.times_us(unit))
 
 
+@pytest.mark.slow
 def test_times_of_the_step_alone_are_not_compared_with_times_to_rows(folder: RunFolder, tmp_path: Path) -> None:
     earlier = RunFolder(shutil.copytree(folder.path, tmp_path / "earlier"))
     journal = earlier.path / "journal.jsonl"

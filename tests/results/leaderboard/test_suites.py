@@ -15,6 +15,8 @@ from uwbbench.results.leaderboard.ranking import Ranking, rankings, speeds_by_ma
 from uwbbench.results.leaderboard.suites import Contender, Suite
 from uwbbench.run.folder import RunFolder
 
+pytestmark = pytest.mark.slow
+
 
 def named(suite: Suite, name: str) -> Contender:
     (found,) = [one for one in suite.contenders if one.name == name]

@@ -13,6 +13,8 @@ from uwbbench.tools.check.inputs import usual_capture
 from uwbbench.tools.check.process import digests_elsewhere
 from uwbbench.tools.check.subject import Subject
 
+pytestmark = pytest.mark.slow
+
 STAGES = [("stage", name) for name in registry.entries("stages")]
 METRICS = [("metric", name) for name in registry.entries("metrics")]
 DETECTORS = [("detector", name) for name in shipped("detectors")]

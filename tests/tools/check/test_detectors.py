@@ -86,6 +86,7 @@ def broken_detector(install_plugin, tmp_path):
     return make
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("check", BROKEN)
 def test_a_broken_detector_is_caught_by_the_check_that_is_about_it(broken_detector, check):
     line, text, found = BROKEN[check]

@@ -257,6 +257,7 @@ BROKEN = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("check", BROKEN)
 def test_a_broken_stage_is_caught_by_the_check_that_is_about_it(judged, check):
     source, found = BROKEN[check]

@@ -4,13 +4,14 @@ Conventions
 -----------
 * Causes add up to the misses of a scoring, kinds to its false detections: each error has exactly one, the first of the
   lists below that holds. *Near* is within the gate by the table's error, in range or in position.
-* A miss of ``object`` is an obstacle in a frame; one of ``frame`` and ``peak`` is a frame, and of its visible obstacles
-  the one counts whose echo came furthest through the detector, by the lists below.
+* A miss of ``object`` and ``track`` is an obstacle in a frame; one of ``frame`` and ``peak`` is a frame, and of its
+  visible obstacles the one counts whose echo came furthest through the detector, by the lists below.
 * Causes of a miss:
 
   1. ``shared``: a detection is near, but belongs to another obstacle.
   2. ``not the strongest``: one is near, but the scoring looks at stronger ones of that frame alone.
-  3. ``not in a cluster``: one is near, but in no cluster (mapping only).
+  3. ``not in a cluster``: one is near, but in no cluster (mapping only); ``not in a track``: in no confirmed track
+     (``track`` only).
   4. ``lost behind the filters``: a candidate that passed all filters is near, but did not come out.
   5. ``dropped by STEP``: candidates are near, and this filter dropped the one that came furthest.
   6. ``outside the window``: no candidate is near, and the echo comes after the last tap.
@@ -21,9 +22,9 @@ Conventions
 * An obstacle that is occluded or outside the region is no miss under any scoring; such are counted beside.
 * Kinds of a false detection:
 
-  1. ``duplicate``: a visible obstacle is near, to which another detection belongs (``object`` only).
+  1. ``duplicate``: a visible obstacle is near, to which another detection belongs (``object`` and ``track``).
   2. ``out of view``: an obstacle is near that is occluded, or outside the region.
-  3. ``structure``: a wall or the like is near. ``object`` sets these aside, so there are none.
+  3. ``structure``: a wall or the like is near. ``object`` and ``track`` set these aside, so there are none.
   4. ``direct path or ringing``: it comes within the pulse of the direct path, or the ringing after it.
   5. ``within twice the gate`` of a visible obstacle.
   6. ``ghost``: it lies, within the gate in range, where an obstacle shows a second time.
@@ -54,7 +55,11 @@ from uwbbench.measure.accuracy.echoes import (
     ghosts_m,
     window_m,
 )
-from uwbbench.measure.accuracy.judge import Scene, ScoringRules, Verdict, judge
+from uwbbench.measure.accuracy.judge import judge
+from uwbbench.measure.accuracy.judges.segments import near_segments
+from uwbbench.measure.accuracy.rules import ScoringRules
+from uwbbench.measure.accuracy.scene import Scene
+from uwbbench.measure.accuracy.verdict import Verdict
 
 NOT_KNOWN = "not known"
 DROPPED = "dropped by "
@@ -72,7 +77,7 @@ KINDS = (
 """Of false detections, in the order in which they are asked for."""
 
 _EARLY = ("outside the window", "masked by the direct path", "no candidate")
-_LATE = ("lost behind the filters", "not in a cluster", "not the strongest", "shared")
+_LATE = ("lost behind the filters", "not in a cluster", "not in a track", "not the strongest", "shared")
 _BEHIND = 1_000_000
 """Rank from which the late causes count; between them and the early ones is the place of the filter."""
 
@@ -120,12 +125,10 @@ def causes(detections: Detections, scene: Scene, rules: ScoringRules, table: Tab
     missed = np.zeros_like(visible)
     frames = np.flatnonzero(scene.scored)[verdict.outcome.fn > 0]
     missed[frames] = visible[frames]
-    if rules.scoring == "object":
+    if rules.one_to_one:
         missed &= ~verdict.found
     rank = _ranks(detections, scene, rules, table, verdict)
-    ranks = (
-        rank[missed] if rules.scoring == "object" else np.where(missed, rank, -_BEHIND).max(axis=1, initial=-1)[frames]
-    )
+    ranks = rank[missed] if rules.one_to_one else np.where(missed, rank, -_BEHIND).max(axis=1, initial=-1)[frames]
     steps = list(detections.chain)
     misses = Counter(_name(code, steps) for code in ranks.tolist())
     scored = scene.scored[:, None] & scene.obstacle & scene.labelled
@@ -155,9 +158,10 @@ def _ranks(detections: Detections, scene: Scene, rules: ScoringRules, table: Tab
         near = _near(candidates, scene, rules, table)
         place = np.nan_to_num(candidates["rejected_by"], nan=float(_BEHIND - len(_EARLY))).astype(np.int64)
         _raise(rank, candidates.frame, near, place + len(_EARLY))
-    _raise(rank, detections.frame, _near(detections, scene, rules, table), _late("not in a cluster"))
-    clustered = detections.take(detections["cluster"] >= 0) if table == "mapping" else detections
-    _raise(rank, clustered.frame, _near(clustered, scene, rules, table), _late("not the strongest"))
+    needed, without = ("track", "not in a track") if rules.scoring == "track" else ("cluster", "not in a cluster")
+    _raise(rank, detections.frame, _near(detections, scene, rules, table), _late(without))
+    judged = detections.take(detections[needed] >= 0) if needed == "track" or table == "mapping" else detections
+    _raise(rank, judged.frame, _near(judged, scene, rules, table), _late("not the strongest"))
     _raise(rank, verdict.retained.frame, _near(verdict.retained, scene, rules, table), _late("shared"))
     return rank
 
@@ -176,6 +180,8 @@ def _near(detections: Detections, scene: Scene, rules: ScoringRules, table: Tabl
     """Which objects (n, objects) each detection is near to."""
     if not len(detections):
         return np.zeros((0, scene.labelled.shape[1]), bool)
+    if rules.scoring == "segment":
+        return near_segments(detections, scene, rules)
     return np.asarray(np.abs(scene.errors_m(detections, table, rules.surface)) <= rules.gate_m)
 
 
@@ -193,7 +199,7 @@ def _kinds(verdict: Verdict, scene: Scene, rules: ScoringRules, table: Table) ->
     if not len(rows):
         return Counter()
     error_m = np.abs(scene.errors_m(rows, table, rules.surface))
-    near, seen = error_m <= rules.gate_m, scene.visible(rules.region)[rows.frame]
+    near, seen = _near(rows, scene, rules, table), scene.visible(rules.region)[rows.frame]
     radar = scene.header.radar
     way_m = excess_m(rows.range_m, rows.azimuth_rad, radar)
     holds = [

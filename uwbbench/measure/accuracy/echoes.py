@@ -21,7 +21,7 @@ import numpy as np
 from uwbbench.api.arrays import BoolArray, FloatArray, IntArray
 from uwbbench.api.geometry import SPEED_OF_LIGHT_M_S, direction, excess_path, receiver_pose, rotate_z, to_world
 from uwbbench.api.radar import Radar
-from uwbbench.measure.accuracy.judge import Scene
+from uwbbench.measure.accuracy.scene import Scene
 
 DIRECT_PULSES, RINGING_PULSES = 2.0, 4.0
 """Units of ``1 / B`` behind the direct path that the pulse covers, and that the ringing after it lasts."""

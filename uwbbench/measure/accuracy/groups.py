@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
 
 import numpy as np
@@ -36,37 +37,24 @@ def blocks_of(capture: Sequence[Outcome]) -> list[list[Outcome]]:
 def _split(outcome: Outcome, ends: IntArray) -> list[Outcome]:
     """Parts of one outcome, each up to the given second."""
     block = np.searchsorted(ends, outcome.group)
-    error_block = block[outcome.error_frame]
-    position = np.empty(len(outcome.group), np.int64)
-    parts = []
-    for number in range(len(ends)):
-        rows = np.flatnonzero(block == number)
-        position[rows] = np.arange(len(rows))
-        parts.append(taken(outcome, rows, np.flatnonzero(error_block == number), position))
-    return parts
+    return [taken(outcome, np.flatnonzero(block == number)) for number in range(len(ends))]
 
 
-def taken(outcome: Outcome, rows: IntArray, error_rows: IntArray, position: IntArray) -> Outcome:
-    """Outcome of some frames and their detections.
+def taken(outcome: Outcome, rows: IntArray) -> Outcome:
+    """Outcome of some frames, with what belongs to them; of any subclass.
 
     Parameters
     ----------
     outcome : Outcome
     rows : int array
         Frames to keep.
-    error_rows : int array
-        Detections of these frames.
-    position : (frames,) int array
-        New row of each kept frame.
     """
-    return Outcome(
-        group=outcome.group[rows],
-        tp=outcome.tp[rows],
-        fp=outcome.fp[rows],
-        fn=outcome.fn[rows],
-        error_frame=position[outcome.error_frame[error_rows]],
-        error_m=outcome.error_m[error_rows],
-        matched=outcome.matched[error_rows],
-        duration_s=outcome.duration_s * len(rows) / len(outcome.group) if len(rows) else 0.0,
-        exhaustive=outcome.exhaustive,
-    )
+    position = np.full(len(outcome.group), -1, np.int64)
+    position[rows] = np.arange(len(rows))
+    kept = {name: getattr(outcome, name)[rows] for name in outcome.per_frame}
+    for frame, names in outcome.per_item.items():
+        place = position[getattr(outcome, frame)]
+        items = np.flatnonzero(place >= 0)
+        kept |= {frame: place[items]} | {name: getattr(outcome, name)[items] for name in names}
+    duration_s = outcome.duration_s * len(rows) / len(outcome.group) if len(rows) else 0.0
+    return dataclasses.replace(outcome, **kept, duration_s=duration_s)

@@ -12,6 +12,8 @@ Conventions
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from uwbbench.api.arrays import FloatArray, IntArray
@@ -59,7 +61,12 @@ def match(cost: FloatArray, gate: float) -> tuple[IntArray, IntArray]:
     return rows[real].astype(np.int64), columns[real].astype(np.int64)
 
 
-def match_frames(frame: IntArray, cost: FloatArray, gate: float) -> IntArray:
+def match_frames(
+    frame: IntArray,
+    cost: FloatArray,
+    gate: float,
+    solve: Callable[[FloatArray, float], tuple[IntArray, IntArray]] = match,
+) -> IntArray:
     """Match the detections of many frames with the objects, each frame for itself, as :func:`match` does.
 
     Most frames have allowed pairs with one detection or one object only. There the cheapest pair is the answer, and
@@ -73,6 +80,9 @@ def match_frames(frame: IntArray, cost: FloatArray, gate: float) -> IntArray:
         Cost of each detection with each object; NaN where the object is not to be matched in that frame.
     gate : float
         Largest allowed cost, inclusive.
+    solve : callable
+        What matches rows and columns of a frame, as :func:`match` does; of one row or one column it must take the
+        cheapest pair.
 
     Returns
     -------
@@ -98,6 +108,6 @@ def match_frames(frame: IntArray, cost: FloatArray, gate: float) -> IntArray:
     ends = np.append(first, len(row))
     for number in np.flatnonzero(crowded):
         members = np.unique(row[ends[number] : ends[number + 1]])
-        rows, columns = match(cost[members], gate)
+        rows, columns = solve(cost[members], gate)
         partner[members[rows]] = columns
     return partner

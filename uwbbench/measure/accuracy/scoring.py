@@ -16,9 +16,10 @@ from typing import Any, get_args
 from uwbbench.api.capture import CaptureHeader
 from uwbbench.api.detections import Detections
 from uwbbench.api.errors import nearest
-from uwbbench.api.metric import Outcome
+from uwbbench.api.metric import Metric, Outcome
+from uwbbench.api.outcomes import PresenceOutcome
 from uwbbench.config.rules import Scoring, Surface, Table
-from uwbbench.measure.accuracy.judge import SCORINGS, Scene, ScoringRules, Verdict, judge
+from uwbbench.measure.accuracy.judge import judge, tables_of
 from uwbbench.measure.accuracy.metrics.detection import F1, FalseAlarmsPerMinute, Precision, Recall
 from uwbbench.measure.accuracy.metrics.error import (
     Bias,
@@ -28,10 +29,24 @@ from uwbbench.measure.accuracy.metrics.error import (
     StandardDeviation,
     matched_only,
 )
+from uwbbench.measure.accuracy.metrics.presence import PRESENCE_METRICS, confusion
+from uwbbench.measure.accuracy.metrics.segment import SEGMENT_METRICS
+from uwbbench.measure.accuracy.metrics.track import TRACK_METRICS
 from uwbbench.measure.accuracy.region import Region
+from uwbbench.measure.accuracy.rules import SCORINGS, ScoringRules
+from uwbbench.measure.accuracy.scene import Scene
 from uwbbench.measure.accuracy.stats import evaluate
+from uwbbench.measure.accuracy.verdict import Verdict
 
 __all__ = ["SCORINGS", "Region", "ScoreBlock", "Scores", "Scoring", "ScoringRules", "outcomes", "score", "tables_of"]
+
+
+_OWN: Mapping[str, Mapping[str, type[Metric]]] = {
+    "track": TRACK_METRICS,
+    "segment": SEGMENT_METRICS,
+    "presence": PRESENCE_METRICS,
+}
+"""Metrics that one scoring alone has, which its scores hold beside those of every scoring."""
 
 
 @dataclass(frozen=True)
@@ -62,6 +77,9 @@ class ScoreBlock:
         Scored frames, and labelled ones that no detector has processed.
     exhaustive : bool
         Whether the truth names all that is visible.
+    own : mapping of str to float
+        What this scoring alone has, such as ``gospa_m`` of tracks (:mod:`uwbbench.measure.accuracy.metrics.track`); in
+        a program's hands like the others: ``block.gospa_m``.
     """
 
     precision: float
@@ -88,10 +106,18 @@ class ScoreBlock:
     frames: int
     unprocessed: int
     exhaustive: bool
+    own: Mapping[str, float] = field(default_factory=dict)
+
+    def __getattr__(self, name: str) -> float:
+        own = self.__dict__.get("own", {})  # absent while an instance is being unpickled
+        if name not in own:
+            raise AttributeError(f"this scoring has no '{name}'")
+        return float(own[name])
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values for JSON, None where a number is undefined."""
         values = dataclasses.asdict(self)
+        values |= values.pop("own")
         return {k: None if isinstance(v, float) and math.isnan(v) else v for k, v in values.items()}
 
 
@@ -134,7 +160,7 @@ class Scores:
 
     def __getattr__(self, name: str) -> Any:
         block = self.__dict__.get("filtering")  # absent while an instance is being unpickled
-        if block is None or name not in block.__dict__:
+        if block is None or not (name in block.__dict__ or name in block.own):
             raise AttributeError(f"scores have no '{name}'")
         return getattr(block, name)
 
@@ -165,7 +191,7 @@ def score(
         With ``range_m``; with ``x_m``, ``y_m`` and ``cluster`` too for the mapping table.
     capture : Capture or CaptureHeader
         Its samples are not touched.
-    scoring : {"frame", "peak", "object", "latest"}
+    scoring : {"frame", "peak", "object", "latest", "track", "segment", "presence"}
     gate_m : float
         Largest error of a true detection, inclusive.
     region : Region, optional
@@ -204,7 +230,7 @@ def score_scene(found: Detections, scene: Scene, rules: ScoringRules) -> Scores:
     ScoringError
         As :func:`score`.
     """
-    verdicts = {table: judge(found, scene, rules, table) for table in tables_of(found)}
+    verdicts = {table: judge(found, scene, rules, table) for table in tables_of(found, rules.scoring)}
     blocks = {table: _block(found, scene, rules, table, verdict) for table, verdict in verdicts.items()}
     kept: dict[str, Outcome] = {table: verdict.outcome for table, verdict in verdicts.items()}
     return Scores(rules, blocks["filtering"], blocks.get("mapping"), kept)
@@ -230,13 +256,13 @@ def outcomes(detections: Detections, header: CaptureHeader, rules: ScoringRules)
         As :func:`score`.
     """
     scene = Scene.of(detections, header)
-    return {table: judge(detections, scene, rules, table).outcome for table in tables_of(detections)}
+    tables = tables_of(detections, rules.scoring)
+    return {table: judge(detections, scene, rules, table).outcome for table in tables}
 
 
-def tables_of(detections: Detections) -> tuple[Table, ...]:
-    """Tables that detections can be judged by: ``mapping`` only where they are clustered."""
-    mapped = all(column in detections for column in ("cluster", "x_m", "y_m"))
-    return ("filtering", "mapping") if mapped else ("filtering",)
+def column_of(name: str, unit: str) -> str:
+    """Column of a metric: lengths say that they are in metres."""
+    return f"{name}_m" if unit == "m" else name
 
 
 def _block(detections: Detections, scene: Scene, rules: ScoringRules, table: Table, verdict: Verdict) -> ScoreBlock:
@@ -267,4 +293,9 @@ def _block(detections: Detections, scene: Scene, rules: ScoringRules, table: Tab
         frames=len(verdict.outcome.group),
         unprocessed=scene.unprocessed,
         exhaustive=scene.truth.exhaustive,
+        own={
+            column_of(name, metric.unit): evaluate(metric, judged)
+            for name, metric in _OWN.get(rules.scoring, {}).items()
+        }
+        | (confusion(verdict.outcome) if isinstance(verdict.outcome, PresenceOutcome) else {}),
     )

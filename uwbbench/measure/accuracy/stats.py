@@ -281,10 +281,7 @@ def drawn(
 
 def subset(outcome: Outcome, frames: BoolArray) -> Outcome:
     """Outcome of the marked ones (scored frames,) among its frames."""
-    rows = np.flatnonzero(frames)
-    position = np.empty(len(outcome.group), np.int64)
-    position[rows] = np.arange(len(rows))
-    return taken(outcome, rows, np.flatnonzero(frames[outcome.error_frame]), position)
+    return taken(outcome, np.flatnonzero(frames))
 
 
 def clopper_pearson(successes: float, trials: float, confidence: float = 0.95) -> tuple[float, float]:

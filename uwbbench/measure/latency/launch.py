@@ -57,9 +57,9 @@ def measure(ref: CaptureRef, detector: DetectorConfig, settings: LatencyModel | 
         If there is no such reference detector.
     """
     settings = settings or LatencyModel()
-    reference = None if settings.reference is None else read_detector(settings.reference).to_dict()
+    reference = None if settings.reference is None else read_detector(settings.reference).here()
     spec: dict[str, Any] = {
-        "detector": detector.to_dict(),
+        "detector": detector.here(),
         "capture": {**asdict(ref), "roots": list(ref.roots)},
         "frames": settings.frames,
         "warmup_windows": settings.warmup_windows,

@@ -139,7 +139,7 @@ def compare(first: RunFolder, second: RunFolder, scoring: str | None = None, mos
     with read_safely(first.path):
         rules = {rule.scoring: rule for rule in first.rules}
         settings = {**first.manifest["experiment"]["intervals"], "seed": first.manifest["experiment"]["seed"]}
-        metrics = combined([folder.manifest["experiment"]["metrics"] for folder in (first, second)])
+        metrics = combined([folder.manifest["experiment"]["metrics"] for folder in (first, second)], list(rules))
     if scoring is not None and scoring not in rules:
         raise ConfigError(f"{first.path}: was not scored by '{scoring}'.{nearest(scoring, rules)}")
     rule = next(rule for name, rule in rules.items() if scoring in (None, name))

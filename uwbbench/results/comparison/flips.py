@@ -19,7 +19,8 @@ import numpy as np
 from uwbbench.api.arrays import FloatArray, IntArray
 from uwbbench.api.errors import ScoringError
 from uwbbench.api.metric import Outcome
-from uwbbench.measure.accuracy.judge import Scene, judge
+from uwbbench.measure.accuracy.judge import judge
+from uwbbench.measure.accuracy.scene import Scene
 from uwbbench.measure.accuracy.scoring import ScoringRules
 from uwbbench.results.comparison.units import Unit
 

@@ -21,6 +21,8 @@ from typing import Any
 from uwbbench.api.errors import ScoringError
 from uwbbench.api.metric import Metric, Outcome
 from uwbbench.measure.accuracy.boards import holm
+from uwbbench.measure.accuracy.metrics.choice import MetricChoice
+from uwbbench.measure.accuracy.rules import rules_on
 from uwbbench.measure.accuracy.scoring import ScoringRules, outcomes
 from uwbbench.measure.accuracy.stats import Difference, evaluate, paired_difference
 from uwbbench.results.comparison.units import Unit
@@ -88,7 +90,7 @@ class TimeChange:
 def score_changes(
     units: Sequence[Unit],
     rules: Sequence[ScoringRules],
-    metrics: Mapping[str, type[Metric]],
+    metrics: MetricChoice,
     settings: Mapping[str, Any],
 ) -> tuple[list[ScoreChange], list[str]]:
     """Every metric of every board, and what could not be judged.
@@ -97,18 +99,16 @@ def score_changes(
     ----------
     units : sequence of Unit
     rules : sequence of ScoringRules
-    metrics : mapping of str to type of Metric
+    metrics : MetricChoice
     settings : mapping
         ``confidence`` of the intervals.
     """
     boards: dict[Board, dict[str, list[tuple[Outcome, Outcome, str]]]] = defaultdict(lambda: defaultdict(list))
     missing: dict[str, None] = {}
     for unit in units:
-        for rule in rules:
+        for rule in rules_on(rules, unit.dataset):
             try:
-                before, after = (
-                    outcomes(detections, unit.header, rule.of(unit.dataset)) for detections in unit.detections
-                )
+                before, after = (outcomes(detections, unit.header, rule) for detections in unit.detections)
             except ScoringError as error:
                 missing[f"not judged by {rule.scoring}: {error}"] = None
                 continue
@@ -116,7 +116,11 @@ def score_changes(
                 if table in after:
                     board = unit.dataset, unit.header.source, rule.scoring, table
                     boards[board][unit.detector].append((before[table], after[table], unit.scene))
-    every = [change for board, members in boards.items() for change in _changes(board, members, metrics, settings)]
+    every = [
+        change
+        for board, members in boards.items()
+        for change in _changes(board, members, metrics.of(board[2]), settings)
+    ]
     return every, list(missing)
 
 

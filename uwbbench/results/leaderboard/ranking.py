@@ -45,7 +45,8 @@ class Standing:
     scored : tuple of Scored
     estimates : mapping of str to Estimate
     ranks : (int, int) or None
-        Smallest and largest rank that it may have; None where it was not scored on all captures, or scenes are too few.
+        Smallest and largest rank that it may have; None for a bound, where it was not scored on all captures, or where
+        scenes are too few.
     speed : Speed or None
     """
 
@@ -94,8 +95,8 @@ class Ranking:
 
     @property
     def metrics(self) -> MetricChoice:
-        """Metrics of its suite."""
-        return self.suite.metrics
+        """Metrics of its suite in its scoring."""
+        return self.suite.metrics.of(self.board[2])
 
     @property
     def headline(self) -> list[str]:
@@ -121,19 +122,20 @@ def rankings(suite: Suite) -> list[Ranking]:
         for one in contender.scored:
             boards[one.dataset, one.source, one.scoring, one.table][contender.key].append(one)
     datasets = suite.datasets
-    scorings: list[str] = [rule.scoring for rule in suite.newest.rules]
+    scorings = suite.scorings
     order = sorted(boards, key=lambda b: (datasets.index(b[0]), b[1], scorings.index(b[2]), b[3]))
     return [_ranking(suite, board, boards[board]) for board in order]
 
 
 def _ranking(suite: Suite, board: Board, members: Mapping[str, list[Scored]]) -> Ranking:
-    metrics = suite.metrics
+    metrics = suite.metrics.of(board[2])
     exhaustive = all(one.outcome.exhaustive for scored in members.values() for one in scored)
     estimates = {key: estimates_of(metrics, scored, SETTINGS) for key, scored in members.items()}
     speeds = speeds_of(suite, board[0])
     times = {key: speed.ratio for key, speed in speeds.items()}
-    ranks = ranks_of(members, metrics, estimates, times, metrics.compared(exhaustive=exhaustive))
     contenders = {one.key: one for one in suite.contenders}
+    bounds = {key for key in members if contenders[key].bound}
+    ranks = ranks_of(members, metrics, estimates, times, metrics.compared(exhaustive=exhaustive), bounds)
     standings = [
         Standing(contenders[key], tuple(members[key]), estimates[key], ranks.sets.get(key), speeds.get(key))
         for key in ranks.order

@@ -70,6 +70,11 @@ class Contender:
         """What distinguishes it from all others."""
         return digest([self.name, self.identity])
 
+    @property
+    def bound(self) -> bool:
+        """Whether it is no detector, but bounds what detectors can reach."""
+        return any(self.name in run.folder.bounds for run in self.runs)
+
     @cached_property
     def scored(self) -> list[Scored]:
         """What counts, with the key as the detector's name."""
@@ -121,10 +126,15 @@ class Suite:
         """Captures of a dataset."""
         return [capture for label, capture in self.captures if label == dataset]
 
+    @property
+    def scorings(self) -> list[str]:
+        """Scorings, in the order of the experiment."""
+        return [rule.scoring for rule in self.newest.rules]
+
     @cached_property
     def metrics(self) -> MetricChoice:
         """Metrics that its runs show; what the newest run lists comes first."""
-        return combined([run.experiment["metrics"] for run in reversed(self.runs)])
+        return combined([run.experiment["metrics"] for run in reversed(self.runs)], self.scorings)
 
     @property
     def datasets(self) -> list[str]:

@@ -14,9 +14,9 @@ from uwbbench.api.interruption import by_plugin
 from uwbbench.api.metric import Metric, Outcome
 from uwbbench.config.rules import RegionModel
 from uwbbench.measure.accuracy.causes import Causes, causes
-from uwbbench.measure.accuracy.judge import Scene
-from uwbbench.measure.accuracy.metrics.choice import MetricChoice, Metrics, names_of
-from uwbbench.measure.accuracy.scoring import Region, ScoringRules, outcomes, score_scene
+from uwbbench.measure.accuracy.metrics.choice import MetricChoice, Metrics
+from uwbbench.measure.accuracy.scene import Scene
+from uwbbench.measure.accuracy.scoring import Region, ScoringRules, column_of, outcomes, score_scene
 from uwbbench.measure.accuracy.stats import evaluate
 from uwbbench.run.folder.folder import RunFolder
 from uwbbench.run.folder.identity import canonical
@@ -29,7 +29,14 @@ CAUSES = "causes"
 def rules_of(experiment: Mapping[str, Any]) -> tuple[ScoringRules, ...]:
     """Scoring rules of an experiment as the manifest holds it, one for each scoring."""
     region = _region(experiment["region"])
-    regions = tuple((used["label"], _region(used["region"])) for used in experiment["datasets"] if "region" in used)
+    datasets = experiment["datasets"]
+    regions = tuple((used["label"], _region(used["region"])) for used in datasets if "region" in used)
+    some = any("scoring" in used for used in datasets)
+
+    def only(scoring: str) -> tuple[str, ...] | None:
+        """Datasets that are scored like this; None where no dataset says how it is scored."""
+        return tuple(used["label"] for used in datasets if scoring in used.get("scoring", [scoring])) if some else None
+
     return tuple(
         ScoringRules(
             scoring,
@@ -38,6 +45,7 @@ def rules_of(experiment: Mapping[str, Any]) -> tuple[ScoringRules, ...]:
             experiment["strongest"],
             experiment.get("surface", "outline"),
             regions,
+            only(scoring),
         )
         for scoring in experiment["scoring"]
     )
@@ -89,7 +97,7 @@ def with_causes(
     ----------
     rows : iterable of mapping
         Of :func:`score_rows`; those that are not scored stay as they are, and so do those by the latest answer, whose
-        errors may be those of another frame.
+        errors may be those of another frame, or of presence, which has none.
     detections : Detections
         With their candidates; without them the causes of misses are not known.
     scene : Scene
@@ -100,7 +108,7 @@ def with_causes(
     by_name = {rule.scoring: rule for rule in rules}
     completed = [dict(row) for row in rows]
     for row in completed:
-        if row["status"] == "scored" and row["scoring"] != "latest":
+        if row["status"] == "scored" and row["scoring"] not in ("latest", "presence"):
             row[CAUSES] = canonical(causes(detections, scene, by_name[row["scoring"]], row["table"]).to_dict())
     return completed
 
@@ -142,8 +150,8 @@ def with_metrics(
     StoreError
         If stored detections are missing or broken.
     """
-    metrics, listed = MetricChoice(chosen), names_of(chosen)
-    columns = {name: column_of(name, metrics[name].unit) for name in listed if name not in metrics.absent}
+    metrics = MetricChoice(chosen, [rule.scoring for rule in rules])
+    columns = {name: column_of(name, metrics[name].unit) for name in metrics.listed if name not in metrics.absent}
     completed = {unit: list(rows) for unit, rows in rows_of.items()}
     for entry in folder.entries() if columns else ():
         rows = completed.get(entry.unit, []) if entry.kind == "accuracy" else []
@@ -159,7 +167,11 @@ def with_metrics(
         for place, row in enumerate(rows):
             if row["status"] == "scored":
                 outcome = tables[row["scoring"]][row["table"]]
-                values = {column: _value(name, metrics[name], outcome) for name, column in columns.items()}
+                here = metrics.of(row["scoring"])
+                values = {
+                    column: _value(name, here[name], outcome) if name in here else None
+                    for name, column in columns.items()
+                }
                 rows[place] = values | row  # what is stored for every run anyway stays
     return completed
 
@@ -175,11 +187,6 @@ def _value(name: str, metric: type[Metric], outcome: Outcome) -> float | None:
             "continue the run with --resume"
         ) from error
     return None if math.isnan(value) else value
-
-
-def column_of(name: str, unit: str) -> str:
-    """Column of a metric: lengths say that they are in metres."""
-    return f"{name}_m" if unit == "m" else name
 
 
 def table_of(entries: Iterable[Entry], rows_of: Mapping[str, list[dict[str, Any]]]) -> list[dict[str, Any]]:

@@ -24,6 +24,8 @@ from uwbbench.api.errors import UwbbenchError
 from uwbbench.api.text import one_line, printable
 from uwbbench.config.detector import RESULTS, detector_identity, from_results
 from uwbbench.measure.accuracy.metrics.choice import MetricChoice, names_of
+from uwbbench.measure.accuracy.rules import rules_on
+from uwbbench.measure.accuracy.scoring import column_of
 from uwbbench.run.folder.folder import RunFolder
 from uwbbench.run.folder.identity import (
     accuracy_identity,
@@ -36,7 +38,7 @@ from uwbbench.run.folder.identity import (
 )
 from uwbbench.run.folder.journal import Entry
 from uwbbench.run.folder.reported import REPORTED_FACT, RESULTS_FACT, reported_times
-from uwbbench.run.folder.scored import causes_of, column_of, rules_of, score_rows, table_of, with_metrics
+from uwbbench.run.folder.scored import causes_of, rules_of, score_rows, table_of, with_metrics
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -211,7 +213,7 @@ class _Verifier:
 
     def _accuracy(self, entry: Entry) -> None:
         sha256 = self._content(entry)
-        rules = [rule.of(entry.dataset) for rule in rules_of(self.manifest["experiment"])]
+        rules = rules_on(rules_of(self.manifest["experiment"]), entry.dataset)
         self._identity(entry, [accuracy_identity(self._detector_of(entry), sha256, rules)])
         detections, header = self.folder.detections(entry.unit), self.folder.header(entry.capture_id)
         counts = {"frames": len(header), "processed": len(detections.processed), "detections": len(detections)}
@@ -226,7 +228,7 @@ class _Verifier:
         self._same(f"journal.jsonl, {_about(entry)}", entry.scores, again)
         for row in entry.scores:
             self._causes(f"journal.jsonl, {_about(entry)}", row)
-        stored = [rule.of(entry.dataset) for rule in self.folder.rules]
+        stored = rules_on(self.folder.rules, entry.dataset)
         self.sound[entry.unit] = again if stored == rules else score_rows(detections, header, stored)
         self._count("units scored again")
         if REPORTED_FACT in entry.facts:
@@ -325,11 +327,12 @@ class _Verifier:
     def _stored_metrics(self, table: pd.DataFrame) -> list[str]:
         """Listed metrics that were stored, which version 0.1.0 did not, and are installed."""
         listed = names_of(self.manifest["experiment"]["metrics"])
-        metrics = MetricChoice(listed)
+        metrics = MetricChoice(listed, [rule.scoring for rule in self.folder.rules])
         self.notes += [
             f"metric {_shown(name)} is not installed: its values were not checked" for name in metrics.absent
         ]
-        return [name for name in listed if name not in metrics.absent and column_of(name, metrics[name].unit) in table]
+        there = [name for name in metrics.listed if name not in metrics.absent]
+        return [name for name in there if column_of(name, metrics[name].unit) in table]
 
     def _same(self, where: str, stored: list[Any], again: list[dict[str, Any]]) -> None:
         """Rows that were stored and computed again."""

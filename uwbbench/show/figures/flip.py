@@ -12,8 +12,8 @@ from uwbbench.api.arrays import FloatArray, IntArray
 from uwbbench.api.block import Block
 from uwbbench.api.capture import Capture
 from uwbbench.api.errors import CaptureError
-from uwbbench.measure.accuracy.judge import Scene
 from uwbbench.measure.accuracy.region import Region
+from uwbbench.measure.accuracy.scene import Scene
 from uwbbench.results import radargram
 from uwbbench.results.comparison.flips import Flip
 from uwbbench.show.figures import style

@@ -21,12 +21,12 @@ def scores(shown: Scores) -> str:
     for name, title in TABLES.items():
         block = shown[name]
         if block is not None:
-            parts += [f"<div>{elements.text(title)}</div>", _table(shown.outcomes[name]), _counts(block)]
+            parts += [f"<div>{elements.text(title)}</div>", _table(shown.outcomes[name], rules.scoring), _counts(block)]
     return elements.frame("scores", f"{rules.scoring}, gate {100 * rules.gate_m:g} cm", *parts)
 
 
-def _table(outcome: Outcome) -> str:
-    metrics = MetricChoice(list(registry.entries("metrics")))
+def _table(outcome: Outcome, scoring: str) -> str:
+    metrics = MetricChoice(list(registry.entries("metrics")), [scoring])
     estimates = {name: estimated(metric, [outcome]) for name, metric in metrics.items() if name not in metrics.absent}
     rows = [_row(Quantity.of(name, metrics[name]), estimate) for name, estimate in estimates.items()]
     enough = "intervals: 95 %, within this recording only, from four blocks of it; says nothing about other scenes"

@@ -23,7 +23,7 @@ def sentences(content: Content) -> Iterator[str]:
 
 
 def _sentence(content: Content, about: Mapping[str, Any], estimates: Mapping[str, Any]) -> str:
-    metrics, exhaustive = content.report.metrics, about["exhaustive"]
+    metrics, exhaustive = content.report.metrics.of(about["scoring"]), about["exhaustive"]
     main = content.quantities[metrics.ranking(exhaustive=exhaustive)]
     said = [main, *(content.quantities[name] for name in metrics.error(exhaustive=exhaustive))]
     figures = " and ".join(f"{by.title} {by.value_of(estimates[by.name])}" for by in said)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property
@@ -85,10 +86,14 @@ class Content:
     def leaders(self) -> dict[tuple[str, str], str]:
         """First detector of each dataset and source, on its first board."""
         leaders: dict[tuple[str, str], str] = {}
-        first = self.report.experiment["scoring"][0] if self.estimates else ""
-        scorings = {about["scoring"] for about, _ in self.estimates}
+        order = self.report.experiment["scoring"]
+        first: dict[str, int] = {}  # scoring of each dataset that comes first among those of the run
         for about, _ in self.estimates:
-            if about["table"] == "filtering" and (about["scoring"] == first or first not in scorings):
+            place = order.index(about["scoring"]) if about["scoring"] in order else len(order)
+            first[about["dataset"]] = min(place, first.get(about["dataset"], place))
+        for about, _ in self.estimates:
+            place = order.index(about["scoring"]) if about["scoring"] in order else len(order)
+            if about["table"] == "filtering" and place == first[about["dataset"]]:
                 leaders.setdefault((about["dataset"], about["source"]), about["detector"])
         return leaders
 
@@ -118,7 +123,7 @@ class Content:
 
     def charted(self, board: Board) -> list[str]:
         """Metrics that charts of a board show."""
-        return self.report.metrics.headline(exhaustive=self.exhaustive(board))
+        return self.report.metrics.of(board[2]).headline(exhaustive=self.exhaustive(board))
 
     def _latencies(self) -> Iterator[Spec]:
         sources = {board[0]: board[1] for board in self.boards}
@@ -175,7 +180,7 @@ class Content:
                 detectors[one.detector],
                 one.captures,
                 one.frames,
-                [_packed(one.estimates[name]) for name in self.quantities],
+                [_packed(one.estimates.get(name, _NOT_HERE)) for name in self.quantities],
                 one.hits > 0,
                 one.errors,
             ]
@@ -183,6 +188,7 @@ class Content:
         ]
         return {
             "detectors": list(self.detectors.values()),
+            "bounds": [name in self.report.bounds for name in self.report.detectors],
             "marks": [[one.path, one.colour] for one in self.marks.values()],
             "quantities": [vars(quantity) for quantity in self.quantities.values()],
             "boards": [self._board(board, materials) for board in boards],
@@ -198,7 +204,8 @@ class Content:
 
     def _board(self, board: Board, materials: Mapping[str, str]) -> dict[str, Any]:
         dataset, source, scoring, table = board
-        members, metrics, exhaustive = self.boards[board], self.report.metrics, self.exhaustive(board)
+        members, exhaustive = self.boards[board], self.exhaustive(board)
+        metrics = self.report.metrics.of(scoring)
         same = {
             f"{channel}|{materials.get(material, '')}": f"{kept[0]}|{materials.get(kept[1], '')}"
             for (channel, material), (kept, _) in cuts(members).items()
@@ -231,6 +238,10 @@ class Content:
                 why = "it does not cluster positions" if board[3] == "mapping" else "it could not be scored"
                 said.append(f"{label}: not here, as {why}.")
         return said
+
+
+_NOT_HERE = Estimate(math.nan, math.nan, math.nan, 0, 0)
+"""Of a metric that has no meaning in a scoring, whose boards have no column for it."""
 
 
 def _of_board(one: SetAside, board: Board) -> bool:

@@ -56,12 +56,7 @@ def _difference(cell: Mapping[str, Any], by: Quantity) -> tuple[str, str, str]:
 
 def paper_sheets(report: Report) -> Iterator[Sheet]:
     """Both tables; with the published figures, and peaks through the chain, where the run covers all their rows."""
-    table = report.paper_tables
-    if table.empty:
-        return
-    quantities = Quantity.of_all(report.metrics.brief)
-    heads = tuple(by.axis for by in quantities.values())
-    for kind in table["table"].unique():
+    for kind, quantities, chosen in _alike(report):
         rows = [
             (
                 shown(row["detector"]),
@@ -77,19 +72,30 @@ def paper_sheets(report: Report) -> Iterator[Sheet]:
                 str(row["errors"]),
                 str(row["frames"]),
             )
-            for row in table[table["table"] == kind].to_dict("records")
+            for row in chosen
         ]
         notes: tuple[str, ...] = ()
-        if report.repeats_the_paper:
+        if report.repeats_the_paper and any(row["scoring"] == published.SCORING for row in chosen):
             rows = sorted([*rows, *_published(kind, quantities)], key=lambda row: row[3:5])  # channel, then material
             about = (
                 f"'{published.NAME}': reported by source, of its own recordings; it gives no counts and no intervals."
             )
             notes = (about, *published.NOTES[kind])
+        heads = [by.axis for by in quantities.values()]
         columns = ("detector", "scoring", "dataset", "channel", "material", "source", *heads, "n", "frames")
         yield Sheet(f"By channel and material, {TABLES[kind]}", columns, tuple(rows), notes)
     if report.repeats_the_paper:
         yield _chain(report)
+
+
+def _alike(report: Report) -> Iterator[tuple[str, dict[str, Quantity], list[dict[str, Any]]]]:
+    """Rows of each table whose scorings have the same metrics, with these."""
+    groups: dict[tuple[str, tuple[str, ...]], list[dict[str, Any]]] = {}
+    for row in report.paper_tables.to_dict("records"):
+        names = tuple(report.metrics.of(row["scoring"]).brief)
+        groups.setdefault((row["table"], names), []).append(row)  # type: ignore[arg-type]
+    for (kind, names), rows in groups.items():
+        yield kind, Quantity.of_all({name: report.metrics[name] for name in names}), rows
 
 
 def _published(kind: str, quantities: Mapping[str, Quantity]) -> Iterator[tuple[str, ...]]:

@@ -81,14 +81,7 @@ def cut(block: Block, start: int, stop: int) -> Block:
     start, stop : int
         First frame, and the one after the last, counted from the start of the block.
     """
-    rows = block.rows
-    parts = {
-        name: value[start:stop]
-        for name in ("first_path", "noise_rms", "profile")
-        if (value := getattr(block, name)) is not None
-    }
-    kept = block.detections.take((rows >= start) & (rows < stop))
-    return block.replace(frames=block.frames.part(start, stop), detections=kept, **parts)
+    return block.cut(start, stop)
 
 
 def pieces(block: Block, cuts: Sequence[int]) -> list[Block]:

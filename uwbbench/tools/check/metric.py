@@ -16,55 +16,12 @@ from uwbbench.api.registry import AuthoredKind
 from uwbbench.measure.accuracy.evidence import merge
 from uwbbench.measure.accuracy.stats import estimated, evaluate
 from uwbbench.tools.check.check import Nonconformity, check
+from uwbbench.tools.check.outcomes import FRAMES, empty, outcome, perfect
 from uwbbench.tools.check.subject import ClassSubject
 from uwbbench.tools.check.values import Values
 
-CAPTURES, FRAMES = 12, 200
+CAPTURES = 12
 _METRIC = "uwbbench.api.metric.Metric"
-
-
-def outcome(seed: int, *, missed: float = 0.1, false: float = 0.1, bias_m: float = 0.02, sd_m: float = 0.05) -> Outcome:
-    """Outcome of 200 frames, each with an object that is found or missed, and at most one false alarm.
-
-    Parameters
-    ----------
-    seed : int
-        Of the random numbers.
-    missed : float
-        Probability that the object of a frame is missed.
-    false : float
-        Probability of a false alarm in a frame.
-    bias_m, sd_m : float
-        Mean and standard deviation of the range errors of matches, which are normal; those of false alarms are uniform
-        from 0.3 m to 1 m.
-    """
-    rng = np.random.default_rng(seed)
-    tp = (rng.uniform(size=FRAMES) >= missed).astype(np.int64)
-    fp = (rng.uniform(size=FRAMES) < false).astype(np.int64)
-    frame = np.repeat(np.arange(FRAMES), tp + fp)
-    first = np.concatenate([[True], np.diff(frame) > 0]) if len(frame) else np.empty(0, bool)
-    matched = first & (tp[frame] == 1)
-    return Outcome(
-        group=np.arange(FRAMES) // 50,
-        tp=tp,
-        fp=fp,
-        fn=1 - tp,
-        error_frame=frame,
-        error_m=np.where(matched, rng.normal(bias_m, sd_m, len(frame)), rng.uniform(0.3, 1.0, len(frame))),
-        matched=matched,
-        duration_s=FRAMES / 48.0,
-    )
-
-
-def perfect() -> Outcome:
-    """Outcome of a detector that finds everything, where it is, and nothing else."""
-    return outcome(0, missed=0.0, false=0.0, bias_m=0.0, sd_m=0.0)
-
-
-def empty() -> Outcome:
-    """Outcome of no frames."""
-    none, nothing = np.empty(0, np.int64), np.empty(0)
-    return Outcome(none, none, none, none, none, nothing, np.empty(0, bool), 0.0)
 
 
 class MetricSubject(ClassSubject):
@@ -76,7 +33,7 @@ class MetricSubject(ClassSubject):
     @cached_property
     def outcomes(self) -> list[Outcome]:
         """The usual outcomes."""
-        return [outcome(seed) for seed in range(1, CAPTURES + 1)]
+        return [outcome(self.cls.of, seed) for seed in range(1, CAPTURES + 1)]
 
     def result(self) -> Values:
         """Partials of all outcomes, and the value of all together."""
@@ -101,7 +58,9 @@ class MetricSubject(ClassSubject):
 
 @check(_METRIC)
 def attributes_are_valid(subject: MetricSubject) -> str:
-    """``merge``, ``better`` and ``kind`` are known words, and ``minimum_samples`` is a positive whole number."""
+    """``of`` is an outcome; ``merge``, ``better``, ``kind`` are known words; ``minimum_samples`` is positive."""
+    if not (isinstance(subject.cls.of, type) and issubclass(subject.cls.of, Outcome)):
+        raise Nonconformity("of as uwbbench.api.Outcome or what a scoring makes of it", repr(subject.cls.of))
     hints = get_type_hints(Metric)
     for name in ("merge", "better", "kind"):
         (choice,) = get_args(hints[name])
@@ -169,7 +128,7 @@ def partials_are_flat_arrays(subject: MetricSubject) -> None:
         if not isinstance(part, np.ndarray) or part.ndim != 1 or part.dtype != np.float64:
             observed = f"{part.dtype} of shape {part.shape}" if isinstance(part, np.ndarray) else type(part).__name__
             raise Nonconformity("float64 arrays of one dimension", observed)
-    lengths = {len(part) for part in [*partials, subject.cls.partial(empty())]}
+    lengths = {len(part) for part in [*partials, subject.cls.partial(empty(subject.cls.of))]}
     if subject.cls.merge == "sum" and len(lengths) > 1:
         raise Nonconformity("partials of one length", f"lengths {sorted(lengths)}")
 
@@ -194,7 +153,7 @@ def grouping_does_not_matter(subject: MetricSubject) -> None:
         "in reverse": parts[::-1],
         "in two halves": [merge(cls, parts[:5]), merge(cls, parts[5:])],
         "one after the other": [merge(cls, [merge(cls, [merge(cls, parts[:2]), parts[2]]), *parts[3:]])],
-        "with an empty capture": [*parts, cls.partial(empty())],
+        "with an empty capture": [*parts, cls.partial(empty(cls.of))],
     }
     for name, pieces in ways.items():
         value = cls.value(merge(cls, pieces))
@@ -205,8 +164,8 @@ def grouping_does_not_matter(subject: MetricSubject) -> None:
 @check("uwbbench.measure.accuracy.metrics")
 def nothing_is_undefined(subject: MetricSubject) -> None:
     """Without frames the value is NaN with n = 0, no zero and no exception: 0/0 is undefined."""
-    estimate = estimated(subject.cls, [empty()])
-    value = subject.cls.value(subject.cls.partial(empty()))
+    estimate = estimated(subject.cls, [empty(subject.cls.of)])
+    value = subject.cls.value(subject.cls.partial(empty(subject.cls.of)))
     if not math.isnan(value) or not math.isnan(estimate.value) or estimate.n:
         raise Nonconformity("NaN with n = 0", f"{value} with n = {estimate.n}")
 
@@ -218,10 +177,10 @@ def perfection_is_best(subject: MetricSubject) -> str:
     At least one of those must get a worse one.
     """
     cls = subject.cls
-    best = evaluate(cls, [perfect()])
+    best = evaluate(cls, [perfect(cls.of)])
     spoiled = {"misses half": {"missed": 0.5}, "invents": {"false": 0.5}, "errs": {"bias_m": 0.3, "sd_m": 0.2}}
     flaws = {name: {"missed": 0.0, "false": 0.0, "bias_m": 0.0, "sd_m": 0.0, **how} for name, how in spoiled.items()}
-    others = {name: evaluate(cls, [outcome(1, **how)]) for name, how in flaws.items()}
+    others = {name: evaluate(cls, [outcome(cls.of, 1, **how)]) for name, how in flaws.items()}
     if not math.isfinite(best):
         raise Nonconformity("a number for a perfect detector", str(best))
     beaten = {name: cls.merit(best) - cls.merit(value) for name, value in others.items()}

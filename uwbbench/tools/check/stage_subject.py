@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import dataclasses
 from collections.abc import Mapping, Sequence
 from functools import cached_property
@@ -19,13 +18,21 @@ from uwbbench.api.detections import Detections
 from uwbbench.api.errors import UwbbenchError
 from uwbbench.api.registry import AuthoredKind
 from uwbbench.api.stage import Stage
+from uwbbench.api.weights import load_weights
 from uwbbench.tools.check.check import Nonconformity
 from uwbbench.tools.check.inputs import frames_of, pieces, usual_capture
 from uwbbench.tools.check.params import working_params
 from uwbbench.tools.check.subject import ClassSubject
 from uwbbench.tools.check.values import Values, of_blocks
 
-PARTS = {"first_path": "first_path", "noise": "noise_rms", "profile": "profile"}
+PARTS = {
+    "first_path": "first_path",
+    "noise": "noise_rms",
+    "profile": "profile",
+    "aligned": "aligned",
+    "window_mean": "window_mean",
+    "window_sd": "window_sd",
+}
 """Attribute of a block behind each port that is one."""
 
 
@@ -64,6 +71,7 @@ class StageSubject(ClassSubject):
             Frames, ascending, before which its background is cut.
         """
         capture = capture or self.capture
+        load_weights(stage, capture.radar)
         stage.open(capture.radar)
         if "truth" in self.cls.needs and capture.truth is not None:
             stage.show_truth(capture.truth, capture.trajectory)
@@ -109,7 +117,10 @@ class StageSubject(ClassSubject):
         """Arrays of the usual block."""
         block = self.block
         arrays = {f"frames.{name}": value for name, value in vars(block.frames).items()}
-        arrays |= {name: getattr(block, name) for name in PARTS.values()}
+        for name in PARTS.values():
+            part = getattr(block, name)
+            plain = part is None or isinstance(part, np.ndarray)
+            arrays |= {name: part} if plain else {f"{name}.{key}": value for key, value in vars(part).items()}
         arrays |= {f"detections.{name}": column for name, column in block.detections.columns.items()}
         return {name: value for name, value in arrays.items() if isinstance(value, np.ndarray)}
 
@@ -197,13 +208,48 @@ def _makers() -> list[str]:
     return chain
 
 
-def _with_port(port: str, block: Block, made: frozenset[str], capture: Capture) -> tuple[Block, frozenset[str]]:
+def _with_port(
+    port: str, block: Block, made: frozenset[str], capture: Capture, waiting: frozenset[str] = frozenset()
+) -> tuple[Block, frozenset[str]]:
+    """Block behind the first stage that makes a port, and behind those that make what that one takes.
+
+    Parameters
+    ----------
+    port : str
+    block : Block
+    made : frozenset of str
+        Ports that are there already.
+    capture : Capture
+    waiting : frozenset of str
+        Ports that are being made with the help of this one, and cannot help to make it.
+
+    Raises
+    ------
+    UwbbenchError
+        If the only stages that make it refuse the capture.
+    Nonconformity
+        If no installed stage makes it.
+    """
+    refused: list[UwbbenchError] = []
+    waiting |= {port}
     for name in registry.entries("stages"):
-        with contextlib.suppress(UwbbenchError, NotApplicable):  # another stage may make it
-            if port in registry.load_plugin("stages", name).produces:
-                behind, known = _through(name, block, made, capture)
-                if port in known:
-                    return behind, known
+        try:
+            cls = registry.load_plugin("stages", name)
+            if port not in cls.produces or cls.consumes & waiting:
+                continue
+            behind, known = block, made
+            for other in sorted(cls.consumes - made):
+                behind, known = _with_port(other, behind, known, capture, waiting)
+            behind, known = _through(name, behind, known, capture)
+        except UwbbenchError as error:  # another stage may make it
+            refused.append(error)
+        except (NotApplicable, Nonconformity):
+            continue
+        else:
+            if port in known:
+                return behind, known
+    if refused:
+        raise refused[0]
     raise Nonconformity("ports that an installed stage makes", f"none that makes '{port}' from the usual ports")
 
 
@@ -214,6 +260,7 @@ def _through(name: str, block: Block, made: frozenset[str], capture: Capture) ->
     if lacks_sts or cls.needs & {"truth", "background"} or cls.consumes - made:
         return block, made
     stage: Stage[Any] = cls(working_params(cls.params_type(), {}, f"stage '{name}'", name))
+    load_weights(stage, capture.radar)
     stage.open(capture.radar)
     parts = [stage.step(block)]
     tail = stage.flush()

@@ -10,7 +10,6 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
-from uwbbench.api import registry
 from uwbbench.api.errors import ConfigError, UwbbenchError, nearest
 from uwbbench.api.locate import find_config
 from uwbbench.api.override import value_at
@@ -21,9 +20,10 @@ from uwbbench.config.given import Given, read_model
 from uwbbench.config.model import ConfigModel
 from uwbbench.config.rules import GateRadius, RegionModel, Scoring, Surface
 from uwbbench.detect.pipeline import Pipeline
+from uwbbench.measure.accuracy.metrics.choice import check_applies, load_metric
 from uwbbench.measure.accuracy.scoring import Region, ScoringRules
 from uwbbench.results.chains import IN_CLUSTERS
-from uwbbench.run.experiment import DetectorUse
+from uwbbench.run.contenders import DetectorUse
 from uwbbench.tools.fit.files import ROBOT, Changes, changed, open_cell
 from uwbbench.tools.tune.config import Choices, Interval
 from uwbbench.tools.tune.search import within
@@ -324,7 +324,7 @@ def _targets(model: FitModel, cells: Mapping[str, Cell], source: YamlFile) -> li
                         raise ConfigError(f"{source.place(at)}: no step '{metric}'.{nearest(metric, steps)}")
                 else:
                     with placed(source, at):
-                        registry.load_plugin("metrics", metric)
+                        check_applies(metric, load_metric(metric), [model.scoring])
                 if key not in model.tolerances:
                     raise ConfigError(f"{source.place(at)}: 'tolerances' says nothing of '{key}'")
                 tolerance = model.tolerances[key]

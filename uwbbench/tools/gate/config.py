@@ -21,6 +21,7 @@ from uwbbench.config.model import ConfigModel, DetectorName, NamedNull
 from uwbbench.config.rules import GateRadius, IntervalModel, RegionModel, Scoring, Strongest, Table
 from uwbbench.config.source import data_roots
 from uwbbench.detect.pipeline import Pipeline
+from uwbbench.measure.accuracy.metrics.choice import check_applies, load_metric
 
 Captures = Literal["first", "all"]
 
@@ -222,7 +223,8 @@ def _check_rule(rule: AccuracyModel, labels: set[str], source: YamlFile, index: 
     """Refuse a limit that can mean nothing."""
     at = ("accuracy", index)
     with placed(source, (*at, "metric")):
-        metric = registry.load_plugin("metrics", rule.metric)
+        metric = load_metric(rule.metric)
+        check_applies(rule.metric, metric, [rule.scoring])
     wrong = {"higher": "maximum", "lower": "minimum"}.get(metric.better, "")
     if wrong and getattr(rule, wrong) is not None:
         raise ConfigError(

@@ -242,12 +242,7 @@ def read_tuning(
         If a file is missing or wrong; the message names file, line and key.
     """
     path, source, model = read_model(TuneModel, "tuning", name, changes)
-    with placed(source, ("detector",)):
-        use = model.detector
-        if is_path(use):
-            use = str(find_config("detectors", use, path.parent).resolve())
-        config = read_detector(use, None, model.set)
-        Pipeline(config)
+    use, config = detector_of(model.detector, model.set, source, path)
     roots = [str(root) for root in data_roots(data_dir, path)]
     return Tuning(
         name=model.name or path.stem,
@@ -257,8 +252,34 @@ def read_tuning(
         sweep=_sweep(model, config, source),
         tuning=dataset_sources(model.tuning, source, roots, "tuning"),
         held_out=dataset_sources(model.held_out, source, roots, "held_out"),
-        experiment=_experiment(model, source, path, data_dir, experiment),
+        experiment=experiment_of(model.experiment, source, path, data_dir, experiment),
     )
+
+
+def detector_of(named: str, changes: Mapping[str, Any], source: YamlFile, path: Path) -> tuple[str, DetectorConfig]:
+    """Detector that a file names under ``detector``: as another file may name it, and checked.
+
+    Parameters
+    ----------
+    named : str
+        Name, or path from the file's folder.
+    changes : mapping
+        Values to change in it, by path.
+    source : YamlFile
+        The file, for messages.
+    path : Path
+        Where it lies.
+
+    Raises
+    ------
+    ConfigError, PluginError
+        If the detector is missing or wrong.
+    """
+    with placed(source, ("detector",)):
+        use = str(find_config("detectors", named, path.parent).resolve()) if is_path(named) else named
+        config = read_detector(use, None, changes)
+        Pipeline(config)
+    return use, config
 
 
 def _sweep(model: TuneModel, config: DetectorConfig, source: YamlFile) -> Sweep | None:
@@ -288,13 +309,33 @@ def behind_the_ranges(config: DetectorConfig) -> tuple[str, ...]:
     return ()
 
 
-def _experiment(
-    model: TuneModel, source: YamlFile, path: Path, data_dir: Path | None, given: str | None
+def experiment_of(
+    named: str | None, source: YamlFile, path: Path, data_dir: Path | None, given: str | None
 ) -> Experiment | None:
+    """Experiment whose captures must not be used; None where there is none.
+
+    Parameters
+    ----------
+    named : str or None
+        As the file has it under ``experiment``: a name, or a path from its folder.
+    source : YamlFile
+        The file, for messages.
+    path : Path
+        Where it lies.
+    data_dir : Path or None
+        First folder in which datasets are searched.
+    given : str or None
+        Name or path that is used instead of the file's.
+
+    Raises
+    ------
+    ConfigError, PluginError
+        If the experiment is missing or wrong.
+    """
     if given is not None:
         return read_experiment(given, data_dir=data_dir)
-    if model.experiment is None:
+    if named is None:
         return None
-    beside = path.parent / model.experiment
+    beside = path.parent / named
     with placed(source, ("experiment",)):
-        return read_experiment(beside if beside.is_file() else model.experiment, data_dir=data_dir)
+        return read_experiment(beside if beside.is_file() else named, data_dir=data_dir)

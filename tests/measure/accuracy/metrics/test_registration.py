@@ -7,18 +7,17 @@ import numpy as np
 import pytest
 
 from uwbbench.api import registry
-from uwbbench.api.metric import Metric, Outcome
+from uwbbench.api.metric import Metric
+from uwbbench.tools.check.outcomes import empty
 
 
 def test_every_registered_metric_evaluates_an_empty_outcome_to_undefined():
-    nothing = np.empty(0, int)
-    outcome = Outcome(nothing, nothing, nothing, nothing, nothing, np.empty(0), np.empty(0, bool), 0.0)
     names = registry.entries("metrics")
     assert {"precision", "recall", "f1", "false_alarms_per_minute", "mae", "p90", "p95", "sd", "bias"} <= set(names)
     for name in names:
         metric = registry.load_plugin("metrics", name)
         assert issubclass(metric, Metric)
-        assert np.isnan(metric.value(metric.partial(outcome))), name
+        assert np.isnan(metric.value(metric.partial(empty(metric.of)))), name
 
 
 @pytest.mark.parametrize(
@@ -28,6 +27,8 @@ def test_every_registered_metric_evaluates_an_empty_outcome_to_undefined():
         "uwbbench.measure.accuracy.stats",
         "uwbbench.measure.accuracy.metrics.detection",
         "uwbbench.measure.accuracy.metrics.error",
+        "uwbbench.measure.accuracy.metrics.track",
+        "uwbbench.measure.accuracy.set_distances",
     ],
 )
 def test_examples_in_docstrings_are_true_and_conventions_are_stated(module):

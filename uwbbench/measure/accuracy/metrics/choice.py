@@ -9,6 +9,8 @@ Conventions
   the order of the list, then the default ones by their ``headline``.
 * The first listed metric ranks; where it has no better end, or is undefined on a board, the first default headline
   metric that can.
+* In a scoring there are those metrics alone that take its outcomes; others are passed over there. Where a scoring has
+  metrics of its own, narrow tables leave out the default ones of every scoring that are no headline.
 * A listed metric that cannot be loaded is not dropped: :class:`Absent` stands for it.
 """
 
@@ -20,8 +22,9 @@ from typing import Any, ClassVar, Literal
 
 from uwbbench.api import registry
 from uwbbench.api.arrays import FloatArray
-from uwbbench.api.errors import PluginError
+from uwbbench.api.errors import ConfigError, PluginError
 from uwbbench.api.metric import Metric, Outcome
+from uwbbench.measure.accuracy.rules import SCORINGS, applies
 
 MOST_COMPARED = 3
 """Default headline metrics in which detectors are compared in pairs."""
@@ -70,42 +73,64 @@ class MetricChoice(Mapping[str, type[Metric]]):
     ----------
     metrics : sequence of str or mapping
         As the experiment has them: listed names, or names under ``rank``, ``table`` and ``charts``.
+    scorings : sequence of str, optional
+        Those that have a meaning in any of these; left out: those that have one in every scoring.
 
     Attributes
     ----------
     listed : tuple of str
-        All names that the experiment has, each once.
+        Those of its names that the experiment has, each once.
     absent : tuple of str
         Listed ones that could not be loaded.
     notes : tuple of str
         What could not be loaded, and why.
     """
 
-    def __init__(self, metrics: Metrics = ()) -> None:
-        listed = names_of(metrics)
+    def __init__(self, metrics: Metrics = (), scorings: Sequence[str] = ()) -> None:
         chosen: dict[str, type[Metric]] = {}
-        notes = []
-        for name in dict.fromkeys([*listed, *registry.entries("metrics")]):
+        notes, asked = [], names_of(metrics)
+        for name in dict.fromkeys([*asked, *registry.entries("metrics")]):
             try:
                 metric = load_metric(name)
             except PluginError as error:
                 notes.append(str(error))
                 metric = Absent
-            if name in listed or metric.default:
+            fits = any(applies(metric, scoring) for scoring in scorings) if scorings else metric.of is Outcome
+            if fits and (name in asked or metric.default):
                 chosen[name] = metric
+        listed = [name for name in asked if name in chosen]
+        self._metrics, self._by_scoring = metrics, dict[str, MetricChoice]()
         self._by_name = dict(sorted(chosen.items(), key=lambda item: item[1].order))
+        own = {name for name, metric in self.items() if metric.of is not Outcome and len(scorings) == 1}
         places = {name: metric.headline for name, metric in self.items() if metric.default}
-        self._leading = [name for _, name in sorted((at, name) for name, at in places.items() if at is not None)]
+        leading = sorted((at, name not in own, name) for name, at in places.items() if at is not None)
+        self._leading = [name for *_, name in leading]
         self._first, self._charts = listed, list[str]()
-        self._table, self._narrow = list(self), [name for name in self if self[name].brief or name in listed]
+        self._table = list(self)
+        self._narrow = [name for name in self if name in listed or self._is_narrow(name, bool(own))]
         self._exact = isinstance(metrics, Mapping)
         if isinstance(metrics, Mapping):
-            self._first, self._charts = [name for name in [metrics.get("rank")] if name], metrics.get("charts") or []
-            self._table = metrics.get("table") or [name for name in self if self[name].default]
-            self._narrow = metrics.get("table") or [name for name in self._table if self[name].brief]
+            first, charts, table = (
+                [name for name in names if name in chosen]
+                for names in ([metrics.get("rank")], metrics.get("charts") or [], metrics.get("table") or [])
+            )
+            self._first, self._charts = first, charts
+            self._table = table or [name for name in self if self[name].default]
+            self._narrow = table or [name for name in self._table if self._is_narrow(name, bool(own))]
         self.listed = tuple(listed)
         self.absent = tuple(name for name in self.listed if chosen[name] is Absent)
         self.notes = tuple(notes)
+
+    def of(self, scoring: str) -> MetricChoice:
+        """Those that have a meaning in one scoring, with what ranks there."""
+        if scoring not in self._by_scoring:
+            self._by_scoring[scoring] = MetricChoice(self._metrics, [scoring])
+        return self._by_scoring[scoring]
+
+    def _is_narrow(self, name: str, crowded: bool) -> bool:
+        """Whether a default metric stands in narrow tables; crowded: where the scoring has metrics of its own."""
+        metric = self[name]
+        return metric.brief and not (crowded and metric.of is Outcome and metric.headline is None)
 
     def __getitem__(self, name: str) -> type[Metric]:
         return self._by_name[name]
@@ -160,17 +185,40 @@ class MetricChoice(Mapping[str, type[Metric]]):
         return [name for name in dict.fromkeys(names) if exhaustive or not self[name].needs_exhaustive_truth]
 
 
-def combined(experiments: Sequence[Metrics]) -> MetricChoice:
+def combined(experiments: Sequence[Metrics], scorings: Sequence[str] = ()) -> MetricChoice:
     """Choice of several experiments: theirs where they agree, else all that any of them has, besides the default ones.
 
     Parameters
     ----------
     experiments : sequence of sequence or mapping
         Metrics of each, the one that counts most first.
+    scorings : sequence of str
+        Those that have a meaning in any of these.
     """
     if experiments and all(metrics == experiments[0] for metrics in experiments):
-        return MetricChoice(experiments[0])
-    return MetricChoice([name for metrics in experiments for name in names_of(metrics)])
+        return MetricChoice(experiments[0], scorings)
+    return MetricChoice([name for metrics in experiments for name in names_of(metrics)], scorings)
+
+
+def check_applies(name: str, metric: type[Metric], scorings: Sequence[str]) -> None:
+    """Refuse a metric that has no meaning in any of some scorings.
+
+    Parameters
+    ----------
+    name : str
+    metric : type of Metric
+    scorings : sequence of str
+
+    Raises
+    ------
+    ConfigError
+        With the scorings that it is for.
+    """
+    if not any(applies(metric, scoring) for scoring in scorings):
+        fitting = [f"'{scoring}'" for scoring in SCORINGS if applies(metric, scoring)]
+        raise ConfigError(
+            f"metric '{name}' has no meaning in the scoring {' or '.join(scorings)}: it is for {', '.join(fitting)}"
+        )
 
 
 def load_metric(name: str) -> type[Metric]:

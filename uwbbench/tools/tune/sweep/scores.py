@@ -13,7 +13,9 @@ from uwbbench.api.capture import Capture, CaptureHeader
 from uwbbench.api.detections import Detections
 from uwbbench.api.errors import ScoringError
 from uwbbench.api.truth import Sight, Trajectory
-from uwbbench.measure.accuracy.judge import Scene, ScoringRules, judge
+from uwbbench.measure.accuracy.judge import judge
+from uwbbench.measure.accuracy.rules import ScoringRules
+from uwbbench.measure.accuracy.scene import Scene
 from uwbbench.tools.tune.sweep.sweep import Swept
 
 RATIOS = ("f1", "precision", "recall", "rmse_m", "mae_m")

@@ -95,7 +95,7 @@ class Sweep:
         ConfigError
             If the thresholds exclude each other, such as a minimum above the maximum; such a set retains nothing.
         """
-        data = with_values(self.config.to_dict(), self.values(index), "sweep")
+        data = with_values(self.config.here(), self.values(index), "sweep")
         return Pipeline(check_detector(data, YamlFile(f"sweep of {self.config.name}", data, {})))
 
     def run(self, capture: Capture) -> Swept:

@@ -1,0 +1,108 @@
+"""Outcomes of scorings that know more of a detector's output than its detections."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar
+
+from uwbbench.api.arrays import BoolArray, FloatArray, IntArray
+from uwbbench.api.metric import Outcome
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrackOutcome(Outcome):
+    """Result of matching confirmed tracks with the truth: a row of a frame is the place of one track there.
+
+    Its errors are those of matched rows; a row that belongs to no object has none.
+
+    Attributes
+    ----------
+    cutoff_m : float
+        Distance from which on a track is not the object's: the gate of the scoring.
+    localisation_m2 : (frames,) array
+        Sum of the squared errors of the matched pairs of each frame, in the assignment that GOSPA is of.
+    ospa_m : (frames,) array
+        OSPA distance of order 1 of each frame.
+    ospa_2_m2 : (frames,) array
+        Square of the OSPA distance of order 2 of each frame.
+    switches, fragmentations : (frames,) int array
+        Objects that in this frame are followed by another track than before, and those that are followed again after
+        they were visible but not followed.
+    object_frame : (objects,) int array
+        Row of the frame in which each object was visible for the first time.
+    delay_s : (objects,) array
+        Time from then to its first confirmed track; NaN where it never had one.
+    track_frame : (tracks,) int array
+        Row of the first frame of each track.
+    false_track : (tracks,) bool array
+        Whether it was near no object for more than half of its frames.
+    """
+
+    per_frame: ClassVar[tuple[str, ...]] = (
+        *Outcome.per_frame,
+        "localisation_m2",
+        "ospa_m",
+        "ospa_2_m2",
+        "switches",
+        "fragmentations",
+    )
+    per_item: ClassVar[Mapping[str, tuple[str, ...]]] = {
+        **Outcome.per_item,
+        "object_frame": ("delay_s",),
+        "track_frame": ("false_track",),
+    }
+
+    cutoff_m: float
+    localisation_m2: FloatArray
+    ospa_m: FloatArray
+    ospa_2_m2: FloatArray
+    switches: IntArray
+    fragmentations: IntArray
+    object_frame: IntArray
+    delay_s: FloatArray
+    track_frame: IntArray
+    false_track: BoolArray
+
+
+@dataclass(frozen=True, kw_only=True)
+class SegmentOutcome(Outcome):
+    """Result of matching segments with the truth: a detection is an interval of range.
+
+    Attributes
+    ----------
+    shared_m : (frames,) array
+        Length that the segments of each frame have in common with what is there.
+    covered_m : (frames,) array
+        Length that segments, or what is there, or both, cover.
+    """
+
+    per_frame: ClassVar[tuple[str, ...]] = (*Outcome.per_frame, "shared_m", "covered_m")
+
+    shared_m: FloatArray
+    covered_m: FloatArray
+
+
+@dataclass(frozen=True, kw_only=True)
+class PresenceOutcome(Outcome):
+    """Result of asking of each frame whether anything is there; a true, false or missed one is a frame.
+
+    Attributes
+    ----------
+    present : (frames,) bool array
+        Whether an obstacle is visible.
+    probability : (frames,) array
+        How probable the detector holds it; NaN throughout where it does not say.
+    classes : tuple of str
+        Names of the classes that the detector tells apart; none where it tells none.
+    true_class, said_class : (frames,) int array
+        Place of the class among ``classes``; -1 where the truth belongs to none of them, or the detector names none.
+    """
+
+    per_frame: ClassVar[tuple[str, ...]] = (*Outcome.per_frame, "present", "probability", "true_class", "said_class")
+
+    present: BoolArray
+    probability: FloatArray
+    classes: tuple[str, ...] = ()
+    true_class: IntArray
+    said_class: IntArray
