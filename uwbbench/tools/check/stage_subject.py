@@ -15,7 +15,7 @@ from uwbbench.api.block import Block
 from uwbbench.api.capture import Capture
 from uwbbench.api.case import NotApplicable
 from uwbbench.api.detections import Detections
-from uwbbench.api.errors import ConfigError, UwbbenchError
+from uwbbench.api.errors import UwbbenchError
 from uwbbench.api.registry import AuthoredKind
 from uwbbench.api.stage import Stage
 from uwbbench.api.weights import load_weights
@@ -225,12 +225,12 @@ def _with_port(
 
     Raises
     ------
-    ConfigError
+    UwbbenchError
         If the only stages that make it refuse the capture.
     Nonconformity
         If no installed stage makes it.
     """
-    refused: list[ConfigError] = []
+    refused: list[UwbbenchError] = []
     waiting |= {port}
     for name in registry.entries("stages"):
         try:
@@ -241,9 +241,9 @@ def _with_port(
             for other in sorted(cls.consumes - made):
                 behind, known = _with_port(other, behind, known, capture, waiting)
             behind, known = _through(name, behind, known, capture)
-        except ConfigError as error:
+        except UwbbenchError as error:  # another stage may make it
             refused.append(error)
-        except (UwbbenchError, NotApplicable, Nonconformity):  # another stage may make it
+        except (NotApplicable, Nonconformity):
             continue
         else:
             if port in known:
