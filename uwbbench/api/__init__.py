@@ -47,7 +47,7 @@ if TYPE_CHECKING:
     from uwbbench.api.locate import find_config
     from uwbbench.api.metric import Metric, Outcome
     from uwbbench.api.numba_internals import as_tuple
-    from uwbbench.api.outcomes import TrackOutcome
+    from uwbbench.api.outcomes import PresenceOutcome, SegmentOutcome, TrackOutcome
     from uwbbench.api.override import with_values
     from uwbbench.api.radar import CHANNEL_CENTER_HZ, Radar
     from uwbbench.api.recording import leak_key, leaks, simulated_recording
@@ -89,7 +89,7 @@ _HOME = {
     "locate": ("find_config",),
     "metric": ("Metric", "Outcome"),
     "numba_internals": ("as_tuple",),
-    "outcomes": ("TrackOutcome",),
+    "outcomes": ("PresenceOutcome", "SegmentOutcome", "TrackOutcome"),
     "override": ("with_values",),
     "radar": ("CHANNEL_CENTER_HZ", "Radar"),
     "recording": ("leak_key", "leaks", "simulated_recording"),
@@ -142,6 +142,7 @@ __all__ = [
     "Params",
     "Paths",
     "PluginError",
+    "PresenceOutcome",
     "Pulse",
     "Radar",
     "RankFilter",
@@ -150,6 +151,7 @@ __all__ = [
     "Samples",
     "SceneObject",
     "ScoringError",
+    "SegmentOutcome",
     "Sight",
     "Stage",
     "StagesOnTrial",

@@ -112,9 +112,9 @@ class Detections:
         Parameters
         ----------
         names : sequence of str
-            Columns behind the frame, none of them of whole numbers.
+            Columns behind the frame.
         table : (n, 1 + columns) array
-            The first column holds the bits of whole numbers, the frames.
+            Whole numbers, such as the frames of the first column, by their bits.
         processed : int and (frames,) bool array
             First frame of the block, and which of its frames were looked at.
         notes : sequence of str
@@ -131,8 +131,8 @@ class Detections:
     def columns(self) -> dict[str, NDArray[Any]]:
         """All columns by name, ``frame`` first."""
         if isinstance(self._columns, tuple):
-            names, table = self._columns
-            self._columns = {"frame": self.frame, **dict(zip(names, table.T[1:], strict=True))}
+            names, _ = self._columns
+            self._columns = {"frame": self.frame, **{name: self[name] for name in names}}
         return self._columns
 
     @property
@@ -194,7 +194,8 @@ class Detections:
     def __getitem__(self, column: str) -> NDArray[Any]:
         """Column by name; NaN throughout where no stage computed it."""
         if isinstance(self._columns, tuple) and column in self._columns[0]:
-            return self._columns[1][:, 1 + self._columns[0].index(column)]
+            values: NDArray[Any] = self._columns[1][:, 1 + self._columns[0].index(column)]
+            return values.view(np.int64) if column in _INTEGER else values
         values = self.columns.get(column)
         return np.full(len(self), np.nan) if values is None else values
 
@@ -333,11 +334,11 @@ class Detections:
         if not len(self):
             return []
         if isinstance(self._columns, tuple):
-            names, table = self._columns
+            names, table = ("frame", *self._columns[0]), self._columns[1]
             values = table.tolist()
-            for row, frame in zip(values, self.frame.tolist(), strict=True):
-                row[0] = frame
-            names = ("frame", *names)
+            for place in [place for place, name in enumerate(names) if name in _INTEGER]:
+                for row, whole in zip(values, table.view(np.int64)[:, place].tolist(), strict=True):
+                    row[place] = whole
             return [dict(zip(names, row, strict=True)) for row in values]
         columns = [values.tolist() for values in self._columns.values()]
         return [dict(zip(self._columns, row, strict=True)) for row in zip(*columns, strict=True)]

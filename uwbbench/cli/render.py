@@ -74,11 +74,12 @@ def print_scores(result: Mapping[str, Any]) -> None:
     title = f"scoring '{result['scoring']}', gate {result['gate_m']:g} m"
     print_table(title, ["", *(f"after {name}" for name in tables)], rows)
     if result["mapping"] is None:
-        why = (
-            "the tracks have no positions"
-            if result["scoring"] == "track"
-            else "the detector does not cluster positions"
-        )
+        reasons = {
+            "track": "the tracks have no positions",
+            "segment": "segments have no positions",
+            "presence": "presence has no positions",
+        }
+        why = reasons.get(result["scoring"], "the detector does not cluster positions")
         typer.echo(f"after mapping: n/a ({why})")
     times = result["latency_us"]
     if times is not None:

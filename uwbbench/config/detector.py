@@ -18,6 +18,7 @@ from uwbbench.api.locate import find_config
 from uwbbench.api.override import with_values
 from uwbbench.api.yaml_file import YamlFile, parse_yaml, read_yaml
 from uwbbench.config.extends import extended
+from uwbbench.config.reported import ReportedFigures
 from uwbbench.config.weights import anchored_weights, portable_weights
 
 BY_CHANNEL = "by_channel"
@@ -47,6 +48,9 @@ class DetectorModel(BaseModel):
     description: str = ""
     citation: str = ""
     fidelity: Literal["from-source", "reconstruction", "baseline", "reference"] = "baseline"
+    reported: list[ReportedFigures] = Field(
+        default_factory=list, description="What the source of the method reports of it; no part of the detector."
+    )
     score: str | None = Field(
         None,
         description="Column that orders its candidates in curves without a threshold, larger first; the first of "
@@ -115,6 +119,8 @@ class DetectorConfig:
     results : Path or None
         Folder in which another program has stored what it found; there are no steps then, and ``fidelity`` says so.
         What is in it counts, not where it is: it is no part of the resolved file.
+    reported : tuple of ReportedFigures
+        What the source of the method reports of it; no part of the resolved file either.
     """
 
     name: str
@@ -124,6 +130,7 @@ class DetectorConfig:
     fidelity: str = "baseline"
     score: str = ""
     results: Path | None = field(default=None, compare=False)
+    reported: tuple[ReportedFigures, ...] = field(default=(), compare=False)
 
     @classmethod
     def of_results(cls, name: str, folder: Path) -> DetectorConfig:
@@ -233,9 +240,14 @@ def check_detector(data: Mapping[str, Any], source: YamlFile) -> DetectorConfig:
         _check_params(step, source, index)
         steps.append(step)
     steps = _completed(steps)
+    for place, figures in enumerate(model.reported):
+        for at, name in enumerate(figures.metrics):
+            if name not in registry.entries("metrics"):
+                where = source.place(("reported", place, "metrics", at))
+                raise ConfigError(f"{where}: no metric '{name}'.{nearest(name, registry.entries('metrics'))}")
     _check_score(model.score, steps, source)
     about = model.description, model.citation, model.fidelity
-    return DetectorConfig(model.name, tuple(steps), *about, model.score or "")
+    return DetectorConfig(model.name, tuple(steps), *about, model.score or "", reported=tuple(model.reported))
 
 
 def _check_score(score: str | None, steps: list[Step], source: YamlFile) -> None:

@@ -23,6 +23,7 @@ from uwbbench.api.arrays import FloatArray, IntArray
 from uwbbench.measure.accuracy import intervals
 from uwbbench.measure.accuracy.intervals import Interval
 from uwbbench.measure.accuracy.ranked import RankedCounts, pooled
+from uwbbench.measure.accuracy.rules import rules_on
 from uwbbench.run.folder.folder import RunFolder
 from uwbbench.run.folder.journal import Entry
 
@@ -101,7 +102,7 @@ def curves_of(folder: RunFolder, units: Sequence[Entry], confidence: float) -> d
     groups: dict[CurveKey, list[tuple[RankedCounts, str]]] = defaultdict(list)
     rules = folder.rules if units else []
     for entry in units:
-        counts = folder.curve(entry.unit, rules[0].of(entry.dataset))
+        counts = folder.curve(entry.unit, rules_on(rules, entry.dataset)[0])
         if counts is not None:
             groups[entry.dataset, entry.facts["source"], entry.detector].append(
                 (counts, folder.scene(entry.dataset, entry.capture))

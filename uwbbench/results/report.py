@@ -34,6 +34,7 @@ from uwbbench.results.error_causes import ErrorCauses, error_causes
 from uwbbench.results.limits import Limits
 from uwbbench.results.pareto import speeds_of_run
 from uwbbench.results.ranked_curves import CurveKey, RankedCurve, curves_of
+from uwbbench.results.reported import reported
 from uwbbench.results.results import Scored, errors_in, estimates_of, scenes_of, scored
 from uwbbench.results.set_aside import SetAside, set_aside
 from uwbbench.results.slices import Board
@@ -353,6 +354,7 @@ class Report:
             ],
             "paper_tables": self.paper_tables.to_dict("records"),
             "published": self.published,
+            "reported": [one.to_dict() for one in reported(self)],
             "chains": self.chains.to_dict("records"),
             "limits": self.limits.to_dict(),
             "latency": [{**facts_of(e), **e.facts, "timed": timed_of(e.facts)} for e in self._of_kind("latency")],

@@ -15,6 +15,7 @@ from uwbbench.api.errors import ScoringError, StoreError
 from uwbbench.api.metric import Outcome
 from uwbbench.measure.accuracy.judge import judge, tables_of
 from uwbbench.measure.accuracy.metrics.choice import MetricChoice
+from uwbbench.measure.accuracy.rules import rules_on
 from uwbbench.measure.accuracy.scene import Scene
 from uwbbench.measure.accuracy.scoring import ScoringRules, column_of
 from uwbbench.measure.accuracy.stats import Estimate, estimated
@@ -87,7 +88,7 @@ def _scored(folder: RunFolder, rows: Mapping[Any, Any], rules: Sequence[ScoringR
             scene = Scene.of(detections, header)
         except ScoringError:  # its reason is in the stored scores
             continue
-        for rule in (one.of(entry.dataset) for one in rules):
+        for rule in rules_on(rules, entry.dataset):
             try:
                 names = tables_of(detections, rule.scoring)
                 tables = {name: judge(detections, scene, rule, name).outcome for name in names}

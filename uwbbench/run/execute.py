@@ -24,6 +24,7 @@ from uwbbench.config.detector import DetectorConfig, detector_identity, read_det
 from uwbbench.config.seeds import HIDDEN
 from uwbbench.detect.pipeline import Pipeline
 from uwbbench.detect.results_folder import ResultsFolder
+from uwbbench.measure.accuracy.rules import rules_on
 from uwbbench.measure.accuracy.scoring import ScoringRules
 from uwbbench.measure.latency.machine import machine, usable_cores
 from uwbbench.run import environment
@@ -134,10 +135,17 @@ def _created(experiment: Experiment, todo: Plan, out: Path | None, jobs: int) ->
         **_code(experiment, todo),
         "scenes": todo.scenes,
         "skipped": todo.skipped,
+        **_reported(experiment),
         **({} if experiment.frozen is None else {"frozen": experiment.frozen.contents()}),
         "sessions": [environment.session(jobs)],
     }
     return RunFolder.create(out, manifest)
+
+
+def _reported(experiment: Experiment) -> dict[str, Any]:
+    """What sources report of the detectors, where they do."""
+    figures = {one.name: [each.model_dump() for each in one.reported] for one in experiment.detectors if one.reported}
+    return {"reported": figures} if figures else {}
 
 
 def _code(experiment: Experiment, todo: Plan) -> dict[str, Any]:
@@ -286,7 +294,7 @@ class _Run:
 
     def _rules(self, dataset: str) -> tuple[ScoringRules, ...]:
         """Rules of the captures of one dataset."""
-        return tuple(rule.of(dataset) for rule in self.rules)
+        return tuple(rules_on(self.rules, dataset))
 
     def _identity(self, unit: Unit, sha256: str) -> str:
         """Identity of a unit on a capture of this content, here and now."""

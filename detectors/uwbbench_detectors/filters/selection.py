@@ -45,6 +45,48 @@ class Nearest(RankFilter[SelectionParams]):
         return (detections["tap"],)
 
 
+class FirstAboveParams(Params):
+    """How strong the nearest detection must be."""
+
+    fraction: float = Field(
+        0.3,
+        gt=0,
+        le=1,
+        description="Least energy (amplitude squared) as a share of the largest of the frame's detections.",
+    )
+
+
+class FirstAbove(Filter[FirstAboveParams]):
+    """Retain the nearest detection of each frame among those not much weaker than its strongest.
+
+    What moves casts echoes by way of walls behind its own, at times stronger ones; nearer ones it casts none. Only
+    detections compare: put filters of range and noise before it.
+
+    Detectors of walking persons take the strongest cell behind low-rank clutter removal (after Sabushimike et al.,
+    Sensors 16(9):1409, 2016); that the nearest strong one is meant, and how strong, is a choice made here.
+    """
+
+    consumes: ClassVar[frozenset[str]] = ports("detections", "amplitude", "tap")
+    fidelity = "reconstruction"
+
+    def keep(self, block: Block) -> BoolArray:
+        """Mask of one detection a frame."""
+        found = block.detections
+        frames, place = np.unique(found.frame, return_inverse=True)
+        amplitude = found["amplitude"]
+        largest = np.full(len(frames), -np.inf)
+        np.fmax.at(largest, place, amplitude)
+        strong = amplitude >= np.sqrt(self.params.fraction) * largest[place]
+        strong &= ~np.isnan(found["tap"])
+        rows = np.flatnonzero(strong)
+        rows = rows[np.lexsort((found["tap"][rows], place[rows]))]
+        first = np.ones(len(rows), bool)
+        first[1:] = np.diff(place[rows]) > 0
+        kept = np.zeros(len(found), bool)
+        kept[rows[first]] = True
+        return kept
+
+
 class AllParams(Params):
     """Nothing to set."""
 

@@ -1,4 +1,12 @@
-"""Mean and standard deviation of aligned magnitudes over windows of frames."""
+"""Mean and standard deviation of aligned magnitudes over windows of frames.
+
+References
+----------
+B. Van Herbruggen, S. Luchie, R. Berkvens, J. Fontaine, E. De Poorter, Impact of CIR processing for UWB radar distance
+estimation with the DW1000 transceiver, IPIN 2023, doi 10.1109/IPIN57070.2023.10332499: which frames are left out, and
+windows of some 5 s, as a public re-implementation and a later paper quote it. That windows follow each other without
+overlap, and what is done about a robot that moves, is chosen here.
+"""
 
 from __future__ import annotations
 

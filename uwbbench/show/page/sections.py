@@ -44,6 +44,12 @@ def published(content: Content) -> Section | None:
     return Section("published", "Published and here", sheets=sheets) if sheets else None
 
 
+def reported(content: Content) -> Section | None:
+    """What sources report of their methods, beside this run."""
+    sheets = tuple(Tables(content.report).reported())
+    return Section("reported", "Reported by source", sheets=sheets) if sheets else None
+
+
 def paper_first(content: Content) -> Section | None:
     """The paper's tables where the run repeats all of them: they are what it was made for."""
     return _paper(content) if content.report.repeats_the_paper else None
@@ -139,6 +145,7 @@ SECTIONS: tuple[Writer, ...] = (
     limits,
     paper_first,
     leaderboard,
+    reported,
     pareto,
     by_range,
     errors,

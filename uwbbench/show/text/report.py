@@ -19,6 +19,7 @@ from uwbbench.show.text.limits_sheets import limits_sheets
 from uwbbench.show.text.numbers import between, interval, number, time_us
 from uwbbench.show.text.paper_sheets import paper_sheets, published_sheets
 from uwbbench.show.text.quantity import Quantity, undefined_titles
+from uwbbench.show.text.reported_sheets import reported_sheets
 from uwbbench.show.text.sheet import Sheet, escaped, sentence, shown
 from uwbbench.show.text.wording import TABLES, set_aside_warning
 
@@ -30,6 +31,7 @@ def sheets(report: Report) -> list[Sheet]:
         tables.published,
         tables.limits,
         tables.leaderboards,
+        tables.reported,
         tables.causes,
         tables.curves,
         tables.paper,
@@ -55,6 +57,10 @@ class Tables:
     def published(self) -> Iterator[Sheet]:
         """Published figures beside this run's, where it covers the rows of the paper."""
         return self._labelled(published_sheets(self._report))
+
+    def reported(self) -> Iterator[Sheet]:
+        """What sources report of their methods, where any detector here is after one that does."""
+        return self._labelled(reported_sheets(self._report))
 
     def leaderboards(self) -> Iterator[Sheet]:
         """One for each dataset, scoring and table; test signals have tables of their own, and no leader."""
