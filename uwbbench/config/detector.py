@@ -37,8 +37,8 @@ class StepModel(BaseModel):
     )
     unless: str | None = Field(
         None,
-        description="Name of an optional step before this one, in whose place it stands: this one is left out where that "
-        "one is in use.",
+        description="Name of an optional step before this one, in whose place it stands: left out where that one is "
+        "in use.",
     )
 
 
