@@ -1,4 +1,4 @@
-"""CFAR and clutter removal: how many times faster than the same per frame, as a user writes it with numpy.
+"""CFAR, entropy and clutter removal: how many times faster than the same per frame, as a user writes it with numpy.
 
 Run through ``python tests/bench/run.py cfar``. Ours are the stages alone, on one long block and, as ``a frame a
 call``, on blocks of one frame.
@@ -21,6 +21,7 @@ from uwbbench_detectors.cfar.factors import TrainingWindow, order_rank, threshol
 HALF, GUARD, RATE, RANK = 6, 2, 1e-3, 0.75
 MEMORY = 0.97
 WINDOW = 64
+CREST = 7
 
 
 def rows(effort: Effort) -> Iterator[Row]:
@@ -31,6 +32,7 @@ def rows(effort: Effort) -> Iterator[Row]:
     bare = after("clutter.exponential", radar, aligned, memory=MEMORY)
     for kind in ("ca", "os"):
         yield from compared(f"cfar.{kind}", radar, bare, partial(cfar, kind, radar.noise_taps), effort)
+    yield from compared("segment.entropy", radar, bare, entropy, effort)
     yield from compared("clutter.exponential", radar, aligned, exponential, effort, memory=MEMORY)
     yield from compared("clutter.mean", radar, aligned, running_mean, effort, window_frames=WINDOW)
     part = aligned.part(0, min(len(aligned), 600))  # the textbook's way takes a millisecond a frame
@@ -56,6 +58,24 @@ def cfar(kind: str, start: int, frames: Frames) -> list[tuple[int, int]]:
                 tap = cell + start
                 if np.argmax(amplitude[max(tap - GUARD, 0) : tap + GUARD + 1]) == min(tap, GUARD):
                     found.append((frame, tap))
+    return found
+
+
+def entropy(frames: Frames) -> list[tuple[int, int]]:
+    """Frame and tap of the strongest sample of each segment, window by window."""
+    found = []
+    for frame, samples in enumerate(frames.preamble):
+        power = np.abs(samples) ** 2
+        if not power.any():
+            continue
+        level = np.array([np.log(np.pi * np.e * power[first : first + 5].mean()) for first in range(len(power) - 4)])
+        centre = np.median(level[-16:])
+        spread = 1.4826 * np.median(np.abs(level[-16:] - centre))
+        hot = np.flatnonzero(level > centre + 5 * spread) + 2
+        hot = hot[hot >= CREST + 3]
+        for run in np.split(hot, np.flatnonzero(np.diff(hot) > 2) + 1):
+            if len(run) > 1:
+                found.append((frame, int(run[0] + np.argmax(power[run[0] : run[-1] + 1]))))
     return found
 
 
@@ -91,15 +111,15 @@ def compared(
     name: str, radar: Radar, frames: Frames, naive: Callable[[Frames], Any], effort: Effort, **params: Any
 ) -> Iterator[Row]:
     """Rows of one stage, after a check that the naive way gives the same."""
-    check(name, naive(frames), stage(name, radar, params).step(Block(frames)))
+    check(name, naive(frames), stage(name, radar, params).step(block(frames)))
     few = frames.part(0, min(len(frames), 300))
     ones = [few.part(row, row + 1) for row in range(len(few))]
 
     def whole() -> Run:
-        return partial(stage(name, radar, params).step, Block(fresh(frames)))
+        return partial(stage(name, radar, params).step, block(fresh(frames)))
 
     def frame_by_frame() -> Run:
-        opened, blocks = stage(name, radar, params), [Block(fresh(one)) for one in ones]
+        opened, blocks = stage(name, radar, params), [block(fresh(one)) for one in ones]
         return lambda: [opened.step(block) for block in blocks]
 
     contenders = {"naive": lambda: partial(naive, few), "ours": whole, "single": frame_by_frame}
@@ -111,7 +131,7 @@ def compared(
     yield told("  a frame a call", single, "times", f"{median(each['single']).value:.3g} us a frame")
 
 
-def check(name: str, expected: Any, block: Block) -> None:
+def check(name: str, expected: Any, found: Block) -> None:
     """Same cells detected, or samples equal to 1e-10 of the largest one.
 
     Raises
@@ -120,9 +140,9 @@ def check(name: str, expected: Any, block: Block) -> None:
         If they differ.
     """
     if isinstance(expected, list):
-        same = expected == list(zip(block.rows.tolist(), block.detections["tap"].astype(int).tolist(), strict=True))
+        same = expected == list(zip(found.rows.tolist(), found.detections["tap"].astype(int).tolist(), strict=True))
     else:
-        same = np.allclose(block.frames.preamble, expected, rtol=0, atol=1e-10 * np.abs(expected).max())
+        same = np.allclose(found.frames.preamble, expected, rtol=0, atol=1e-10 * np.abs(expected).max())
     if not same:
         raise Disagreement(f"{name} differs from the naive loop")
 
@@ -138,6 +158,11 @@ def stage(name: str, radar: Radar, params: dict[str, Any]) -> Stage[Any]:
 def after(name: str, radar: Radar, frames: Frames, **params: Any) -> Frames:
     """What a stage makes of the frames."""
     return stage(name, radar, params).step(Block(frames)).frames
+
+
+def block(frames: Frames) -> Block:
+    """Frames that are aligned to their direct path."""
+    return Block(frames, first_path=np.full(len(frames), float(CREST)))
 
 
 def fresh(frames: Frames) -> Frames:

@@ -13,7 +13,8 @@ if TYPE_CHECKING:
     from uwbbench.api.arrays import BoolArray, ComplexArray, FloatArray, IntArray
     from uwbbench.api.block import Block
     from uwbbench.api.capture import Capture, CaptureHeader, Samples, analytic
-    from uwbbench.api.capture_file import list_receivers, open_capture, write_capture
+    from uwbbench.api.capture_file import list_receivers, open_capture
+    from uwbbench.api.capture_writing import write_capture
     from uwbbench.api.case import Evidence, NotApplicable, Violation, cases_of, hard_case
     from uwbbench.api.check import checked
     from uwbbench.api.compiling import compiled, inlined
@@ -47,7 +48,7 @@ if TYPE_CHECKING:
     from uwbbench.api.locate import find_config
     from uwbbench.api.metric import Metric, Outcome
     from uwbbench.api.numba_internals import as_tuple
-    from uwbbench.api.outcomes import TrackOutcome
+    from uwbbench.api.outcomes import PresenceOutcome, SegmentOutcome, TrackOutcome
     from uwbbench.api.override import with_values
     from uwbbench.api.radar import CHANNEL_CENTER_HZ, Radar
     from uwbbench.api.recording import leak_key, leaks, simulated_recording
@@ -63,7 +64,8 @@ _HOME = {
     "arrays": ("BoolArray", "ComplexArray", "FloatArray", "IntArray"),
     "block": ("Block",),
     "capture": ("Capture", "CaptureHeader", "Samples", "analytic"),
-    "capture_file": ("list_receivers", "open_capture", "write_capture"),
+    "capture_file": ("list_receivers", "open_capture"),
+    "capture_writing": ("write_capture",),
     "case": ("Evidence", "NotApplicable", "Violation", "cases_of", "hard_case"),
     "check": ("checked",),
     "compiling": ("compiled", "inlined"),
@@ -89,7 +91,7 @@ _HOME = {
     "locate": ("find_config",),
     "metric": ("Metric", "Outcome"),
     "numba_internals": ("as_tuple",),
-    "outcomes": ("TrackOutcome",),
+    "outcomes": ("PresenceOutcome", "SegmentOutcome", "TrackOutcome"),
     "override": ("with_values",),
     "radar": ("CHANNEL_CENTER_HZ", "Radar"),
     "recording": ("leak_key", "leaks", "simulated_recording"),
@@ -142,6 +144,7 @@ __all__ = [
     "Params",
     "Paths",
     "PluginError",
+    "PresenceOutcome",
     "Pulse",
     "Radar",
     "RankFilter",
@@ -150,6 +153,7 @@ __all__ = [
     "Samples",
     "SceneObject",
     "ScoringError",
+    "SegmentOutcome",
     "Sight",
     "Stage",
     "StagesOnTrial",

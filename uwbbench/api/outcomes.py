@@ -63,3 +63,46 @@ class TrackOutcome(Outcome):
     delay_s: FloatArray
     track_frame: IntArray
     false_track: BoolArray
+
+
+@dataclass(frozen=True, kw_only=True)
+class SegmentOutcome(Outcome):
+    """Result of matching segments with the truth: a detection is an interval of range.
+
+    Attributes
+    ----------
+    shared_m : (frames,) array
+        Length that the segments of each frame have in common with what is there.
+    covered_m : (frames,) array
+        Length that segments, or what is there, or both, cover.
+    """
+
+    per_frame: ClassVar[tuple[str, ...]] = (*Outcome.per_frame, "shared_m", "covered_m")
+
+    shared_m: FloatArray
+    covered_m: FloatArray
+
+
+@dataclass(frozen=True, kw_only=True)
+class PresenceOutcome(Outcome):
+    """Result of asking of each frame whether anything is there; a true, false or missed one is a frame.
+
+    Attributes
+    ----------
+    present : (frames,) bool array
+        Whether an obstacle is visible.
+    probability : (frames,) array
+        How probable the detector holds it; NaN throughout where it does not say.
+    classes : tuple of str
+        Names of the classes that the detector tells apart; none where it tells none.
+    true_class, said_class : (frames,) int array
+        Place of the class among ``classes``; -1 where the truth belongs to none of them, or the detector names none.
+    """
+
+    per_frame: ClassVar[tuple[str, ...]] = (*Outcome.per_frame, "present", "probability", "true_class", "said_class")
+
+    present: BoolArray
+    probability: FloatArray
+    classes: tuple[str, ...] = ()
+    true_class: IntArray
+    said_class: IntArray

@@ -19,6 +19,8 @@ class Scoring(StrEnum):
     OBJECT = "object"
     LATEST = "latest"
     TRACK = "track"
+    SEGMENT = "segment"
+    PRESENCE = "presence"
 
 
 class Surface(StrEnum):

@@ -9,8 +9,8 @@ from pydantic import Discriminator, Field, Tag, ValidationInfo, field_validator
 
 from uwbbench.config.model import ConfigModel
 
-Scoring = Literal["frame", "peak", "object", "latest", "track"]
-"""What counts as one chance to be right: a frame, a peak, an object in a frame, the latest answer, or a track."""
+Scoring = Literal["frame", "peak", "object", "latest", "track", "segment", "presence"]
+"""What counts as one chance to be right: a frame, a peak, an object in a frame, the latest answer, a track, ..."""
 
 Table = Literal["filtering", "mapping"]
 """After which half of a detector: its filters, or its clustering."""

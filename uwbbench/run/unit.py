@@ -186,7 +186,7 @@ def _detected(job: Job) -> Finished:
         scores=rows,
         facts=facts,
     )
-    kept = detections.candidates if any(rule.scoring == "peak" for rule in job.rules) else None
+    kept = detections.candidates if any(rule.scoring in ("peak", "presence") for rule in job.rules) else None
     return Finished(
         entry=entry,
         found=_bare(detections),

@@ -11,6 +11,7 @@ from uwbbench.api import (
     SPEED_OF_LIGHT_M_S,
     Block,
     ConfigError,
+    FloatArray,
     Params,
     Radar,
     Stage,
@@ -116,9 +117,21 @@ class Range(Stage[RangeParams]):
         return {"bias_m": self.params.bias_m + offset}
 
     def step(self, block: Block) -> Block:
-        """Block whose detections carry ``delay_s`` and ``range_m``."""
+        """Block whose detections carry ``delay_s`` and ``range_m``, those of segments the ranges of their ends."""
+        delay_s = self._delay_s(block, "tap")
+        columns = {"delay_s": delay_s, "range_m": self._range_m(block, delay_s)}
+        if "start_tap" in block.detections.names:
+            columns["range_start_m"] = self._range_m(block, self._delay_s(block, "start_tap"))
+            columns["range_stop_m"] = self._range_m(block, self._delay_s(block, "stop_tap"))
+        return block.with_columns(**columns)
+
+    def _delay_s(self, block: Block, tap: str) -> FloatArray:
+        """Delays (n,) behind the first path of a column of taps."""
+        return np.asarray((block.detections[tap] - block.part("first_path")[block.rows]) * self.interval_s)
+
+    def _range_m(self, block: Block, delay_s: FloatArray) -> FloatArray:
+        """Ranges (n,) of delays (n,)."""
         radar = self.radar
-        delay_s = (block.detections["tap"] - block.part("first_path")[block.rows]) * self.interval_s
         flown_s = delay_s * self.speed_ratio
         if self.params.includes_baseline:
             excess_m = radar.excess_m(flown_s)
@@ -129,7 +142,7 @@ class Range(Stage[RangeParams]):
             range_m = bistatic_range(excess_m, direction(azimuth_rad), radar.baseline_m)
         else:
             range_m = bistatic_range_sine(excess_m, azimuth_rad, radar.baseline_length_m)
-        return block.with_columns(delay_s=delay_s, range_m=range_m - self.bias_m)
+        return np.asarray(range_m - self.bias_m)
 
 
 class PositionParams(Params):

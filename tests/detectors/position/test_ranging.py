@@ -56,6 +56,17 @@ def test_delay_counts_from_the_first_path(ranged, make_radar):
     assert ranged(make_radar(), [12.5]).columns["delay_s"][0] == pytest.approx(12.5e-9)
 
 
+def test_ends_of_segments_become_ranges_as_their_crests_do(make_stage, make_block, run_stage, make_radar):
+    found = Detections([0], tap=[20.0], start_tap=[17.5], stop_tap=[24.5])
+    block = make_block(np.ones((1, 50)), first_path=np.array([7.0]), detections=found)
+    ranged = run_stage(make_stage("range", bias_m=0.1), make_radar(), block).detections
+    alone = [
+        run_stage(make_stage("range", bias_m=0.1), make_radar(), block.replace(detections=Detections([0], tap=[tap])))
+        for tap in (17.5, 24.5)
+    ]
+    assert [ranged["range_start_m"][0], ranged["range_stop_m"][0]] == [one.detections.range_m[0] for one in alone]
+
+
 def test_delay_from_transmission_holds_the_baseline_already(ranged, make_radar):
     radar = make_radar(tx_position_m=(0.0, 0.3, 0.0), first_tap_delay_s=20e-9)
     target = np.array([[4.0, 0.0, 0.0]])

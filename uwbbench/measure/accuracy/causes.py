@@ -4,8 +4,8 @@ Conventions
 -----------
 * Causes add up to the misses of a scoring, kinds to its false detections: each error has exactly one, the first of the
   lists below that holds. *Near* is within the gate by the table's error, in range or in position.
-* A miss of ``object`` and ``track`` is an obstacle in a frame; one of ``frame`` and ``peak`` is a frame, and of its visible obstacles
-  the one counts whose echo came furthest through the detector, by the lists below.
+* A miss of ``object`` and ``track`` is an obstacle in a frame; one of ``frame`` and ``peak`` is a frame, and of its
+  visible obstacles the one counts whose echo came furthest through the detector, by the lists below.
 * Causes of a miss:
 
   1. ``shared``: a detection is near, but belongs to another obstacle.
@@ -56,6 +56,7 @@ from uwbbench.measure.accuracy.echoes import (
     window_m,
 )
 from uwbbench.measure.accuracy.judge import judge
+from uwbbench.measure.accuracy.judges.segments import near_segments
 from uwbbench.measure.accuracy.rules import ScoringRules
 from uwbbench.measure.accuracy.scene import Scene
 from uwbbench.measure.accuracy.verdict import Verdict
@@ -179,6 +180,8 @@ def _near(detections: Detections, scene: Scene, rules: ScoringRules, table: Tabl
     """Which objects (n, objects) each detection is near to."""
     if not len(detections):
         return np.zeros((0, scene.labelled.shape[1]), bool)
+    if rules.scoring == "segment":
+        return near_segments(detections, scene, rules)
     return np.asarray(np.abs(scene.errors_m(detections, table, rules.surface)) <= rules.gate_m)
 
 
@@ -196,7 +199,7 @@ def _kinds(verdict: Verdict, scene: Scene, rules: ScoringRules, table: Table) ->
     if not len(rows):
         return Counter()
     error_m = np.abs(scene.errors_m(rows, table, rules.surface))
-    near, seen = error_m <= rules.gate_m, scene.visible(rules.region)[rows.frame]
+    near, seen = _near(rows, scene, rules, table), scene.visible(rules.region)[rows.frame]
     radar = scene.header.radar
     way_m = excess_m(rows.range_m, rows.azimuth_rad, radar)
     holds = [

@@ -23,6 +23,10 @@ Conventions
 * ``latest``: as ``frame``, of the latest answer that had been given by then (:mod:`uwbbench.measure.accuracy.age`).
 * ``track``: the rows of confirmed tracks are matched with visible obstacles as in ``object``, but by
   :mod:`uwbbench.measure.accuracy.judges.tracks`.
+* ``segment``: segments are matched with visible obstacles as detections are in ``object``, but by
+  :mod:`uwbbench.measure.accuracy.judges.segments`.
+* ``presence``: every frame is judged as a whole, by :mod:`uwbbench.measure.accuracy.judges.presence`; the only scoring
+  of rows without a range.
 * An error refers to the matched obstacle, else to the nearest visible one, else to the nearest labelled one.
 * Truth that is not exhaustive: a detection that matches nothing is ``unmatched``, neither true nor false, and has no
   error. Frames and obstacles that nothing matches are misses.
@@ -32,8 +36,11 @@ Conventions
 from __future__ import annotations
 
 from uwbbench.api.detections import Detections
+from uwbbench.api.errors import ScoringError
 from uwbbench.config.rules import Table
 from uwbbench.measure.accuracy.judges.detections import judge_detections
+from uwbbench.measure.accuracy.judges.presence import judge_presence
+from uwbbench.measure.accuracy.judges.segments import judge_segments
 from uwbbench.measure.accuracy.judges.tracks import judge_tracks
 from uwbbench.measure.accuracy.rules import ScoringRules
 from uwbbench.measure.accuracy.scene import Scene
@@ -57,13 +64,33 @@ def judge(detections: Detections, scene: Scene, rules: ScoringRules, table: Tabl
     ------
     ScoringError
         If ``peak`` is asked for without the peaks before the filters, ``latest`` without the times of hand-out, or
-        ``track`` of detections that no stage made tracks of.
+        ``track`` or ``segment`` of detections that no stage made tracks or segments of; or rows lack a range, which
+        ``presence`` alone can do without.
     """
-    family = judge_tracks if rules.scoring == "track" else judge_detections
-    return family(detections, scene, rules, table)
+    if rules.scoring != "presence":
+        _check_ranges(detections)
+    return _FAMILIES.get(rules.scoring, judge_detections)(detections, scene, rules, table)
+
+
+_FAMILIES = {"track": judge_tracks, "segment": judge_segments, "presence": judge_presence}
+"""Judges of the scorings that judge something else than single detections."""
+
+
+def _check_ranges(detections: Detections) -> None:
+    if Scene.without_ranges(detections):
+        raise ScoringError(
+            "the detections have a probability and no range: they speak of frames as a whole; score them by 'presence'"
+        )
+    if len(detections) and "range_m" not in detections:
+        raise ScoringError("the detections have no range_m; add the stage 'range' to the detector")
 
 
 def tables_of(detections: Detections, scoring: str) -> tuple[Table, ...]:
-    """Tables that detections can be judged by: ``mapping`` where they are clustered, or are tracks with positions."""
+    """Tables that detections can be judged by: ``mapping`` where they are clustered, or are tracks with positions.
+
+    Segments and presence have no positions.
+    """
+    if scoring in ("segment", "presence"):
+        return ("filtering",)
     needed = ("x_m", "y_m") if scoring == "track" else ("cluster", "x_m", "y_m")
     return ("filtering", "mapping") if all(column in detections for column in needed) else ("filtering",)

@@ -11,6 +11,8 @@ Conventions
   ``sum (R_k - R_(k-1)) P_k``, without interpolation, as scikit-learn has it.
 * Scores are stored with 11 significant bits, 0.05 %: counts of captures then add up exactly at every stored threshold,
   and take little room.
+* Candidates that speak of frames as a whole, with a probability and without a range, are judged as ``presence`` judges:
+  what is counted are frames.
 * The *setting* of a detector is what it hands out itself, judged in the same way. It lies on the curve where its
   filters are a threshold of the score alone, and off it where they know more, or less, than the score.
 """
@@ -26,12 +28,13 @@ import numpy as np
 
 from uwbbench.api.arrays import BoolArray, FloatArray, IntArray
 from uwbbench.api.detections import Detections
+from uwbbench.api.outcomes import PresenceOutcome
 from uwbbench.measure.accuracy.judge import judge
 from uwbbench.measure.accuracy.matching import match
 from uwbbench.measure.accuracy.rules import ScoringRules
 from uwbbench.measure.accuracy.scene import Scene
 
-SCORES = ("score_db", "prominence", "amplitude")
+SCORES = ("probability", "score_db", "prominence", "amplitude")
 """Columns that order candidates where a detector names none, the first that they have."""
 
 _SIGNIFICANT = 2.0**11
@@ -115,6 +118,8 @@ def ranked(detections: Detections, scene: Scene, rules: ScoringRules, asked: str
     order = None if candidates is None else order_of(candidates, asked)
     if candidates is None or order is None:
         return None
+    if Scene.without_ranges(candidates):
+        return _ranked_frames(detections, scene, rules)
     every = dataclasses.replace(rules, scoring="object", strongest=None)
     setting = judge(detections, scene, every, "filtering").outcome
     visible = scene.visible(rules.region)
@@ -136,6 +141,25 @@ def ranked(detections: Detections, scene: Scene, rules: ScoringRules, asked: str
         set_tp=int(setting.tp.sum()),
         set_fp=int(setting.fp.sum()),
         exhaustive=scene.truth.exhaustive,
+    )
+
+
+def _ranked_frames(detections: Detections, scene: Scene, rules: ScoringRules) -> RankedCounts:
+    """Counts of frames by their probability, where candidates speak of frames as a whole."""
+    outcome = judge(detections, scene, dataclasses.replace(rules, scoring="presence"), "filtering").outcome
+    assert isinstance(outcome, PresenceOutcome)  # noqa: S101 - of this scoring
+    threshold, place = np.unique(-_coarse(outcome.probability), return_inverse=True)
+    frames, tp = (np.bincount(place, rows, minlength=len(threshold)) for rows in (None, outcome.present))
+    return RankedCounts(
+        score=-threshold,
+        tp=tp.astype(np.int64),
+        fp=(frames - tp).astype(np.int64),
+        there=int(outcome.present.sum()),
+        duration_s=outcome.duration_s,
+        order="probability",
+        set_tp=int(outcome.tp.sum()),
+        set_fp=int(outcome.fp.sum()),
+        exhaustive=outcome.exhaustive,
     )
 
 
@@ -178,6 +202,24 @@ def pooled(parts: Sequence[RankedCounts]) -> RankedCounts:
         set_fp=sum(part.set_fp for part in parts),
         exhaustive=all(part.exhaustive for part in parts),
     )
+
+
+def without_each(parts: Sequence[RankedCounts]) -> list[float]:
+    """Average precision of several captures together, without each of them in turn.
+
+    What a capture adds is taken out of what all add at their common thresholds: they are sorted once.
+    """
+    whole = pooled(parts)
+    areas = []
+    for part in parts:
+        place = np.searchsorted(-whole.score, -part.score)
+        tp, fp = whole.tp.copy(), whole.fp.copy()
+        tp[place] -= part.tp
+        fp[place] -= part.fp
+        rest = [one for one in parts if one is not part]
+        there, exhaustive = whole.there - part.there, all(one.exhaustive for one in rest)
+        areas.append(dataclasses.replace(whole, tp=tp, fp=fp, there=there, exhaustive=exhaustive).average_precision)
+    return areas
 
 
 def _steps(

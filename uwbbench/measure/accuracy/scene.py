@@ -48,8 +48,15 @@ class Scene:
     unprocessed: int
 
     @classmethod
-    def of(cls, detections: Detections, header: CaptureHeader) -> Scene:
+    def of(cls, detections: Detections, header: CaptureHeader, sight: Sight | None = None) -> Scene:
         """Scene of a capture for a detector's output.
+
+        Parameters
+        ----------
+        detections : Detections
+        header : CaptureHeader
+        sight : Sight, optional
+            Of the capture's objects, where it is known from another detector's output.
 
         Raises
         ------
@@ -66,15 +73,19 @@ class Scene:
                     f"the detections name frame {outside[0]}, but capture '{header.name}' has {frames} frames; "
                     "they come from another capture"
                 )
-        if len(detections) and "range_m" not in detections:
-            raise ScoringError("the detections have no range_m; add the stage 'range' to the detector")
-        sight = truth.seen_from(header.radar, header.trajectory)
+        sight = sight or truth.seen_from(header.radar, header.trajectory)
         labelled = np.isfinite(sight.range_m) & np.isfinite(sight.azimuth_rad)
         obstacle = np.array([not item.structure for item in truth.objects], bool)
         known = labelled.all(axis=1) if truth.exhaustive else (labelled & obstacle).any(axis=1)
         processed = np.zeros(frames, bool)
         processed[detections.processed] = True
         return cls(header, truth, sight, labelled, obstacle, known & processed, int(np.sum(known & ~processed)))
+
+    @staticmethod
+    def without_ranges(detections: Detections) -> bool:
+        """Whether detections speak of their frames as a whole: with a probability, and without a range in any row."""
+        known = "range_m" in detections and np.isfinite(detections.range_m).any()
+        return len(detections) > 0 and "probability" in detections and not known
 
     def inside(self, region: Region) -> BoolArray:
         """Whether each object (frames, objects) lies between the region's ranges."""

@@ -17,6 +17,7 @@ from uwbbench.api.capture import CaptureHeader
 from uwbbench.api.detections import Detections
 from uwbbench.api.errors import nearest
 from uwbbench.api.metric import Metric, Outcome
+from uwbbench.api.outcomes import PresenceOutcome
 from uwbbench.config.rules import Scoring, Surface, Table
 from uwbbench.measure.accuracy.judge import judge, tables_of
 from uwbbench.measure.accuracy.metrics.detection import F1, FalseAlarmsPerMinute, Precision, Recall
@@ -28,6 +29,8 @@ from uwbbench.measure.accuracy.metrics.error import (
     StandardDeviation,
     matched_only,
 )
+from uwbbench.measure.accuracy.metrics.presence import PRESENCE_METRICS, confusion
+from uwbbench.measure.accuracy.metrics.segment import SEGMENT_METRICS
 from uwbbench.measure.accuracy.metrics.track import TRACK_METRICS
 from uwbbench.measure.accuracy.region import Region
 from uwbbench.measure.accuracy.rules import SCORINGS, ScoringRules
@@ -38,7 +41,11 @@ from uwbbench.measure.accuracy.verdict import Verdict
 __all__ = ["SCORINGS", "Region", "ScoreBlock", "Scores", "Scoring", "ScoringRules", "outcomes", "score", "tables_of"]
 
 
-_OWN: Mapping[str, Mapping[str, type[Metric]]] = {"track": TRACK_METRICS}
+_OWN: Mapping[str, Mapping[str, type[Metric]]] = {
+    "track": TRACK_METRICS,
+    "segment": SEGMENT_METRICS,
+    "presence": PRESENCE_METRICS,
+}
 """Metrics that one scoring alone has, which its scores hold beside those of every scoring."""
 
 
@@ -184,7 +191,7 @@ def score(
         With ``range_m``; with ``x_m``, ``y_m`` and ``cluster`` too for the mapping table.
     capture : Capture or CaptureHeader
         Its samples are not touched.
-    scoring : {"frame", "peak", "object", "latest", "track"}
+    scoring : {"frame", "peak", "object", "latest", "track", "segment", "presence"}
     gate_m : float
         Largest error of a true detection, inclusive.
     region : Region, optional
@@ -289,5 +296,6 @@ def _block(detections: Detections, scene: Scene, rules: ScoringRules, table: Tab
         own={
             column_of(name, metric.unit): evaluate(metric, judged)
             for name, metric in _OWN.get(rules.scoring, {}).items()
-        },
+        }
+        | (confusion(verdict.outcome) if isinstance(verdict.outcome, PresenceOutcome) else {}),
     )

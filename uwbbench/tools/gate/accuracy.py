@@ -73,7 +73,8 @@ def found_on(gate: Gate, worker: Worker, ref: CaptureRef, scene: str) -> Found:
         If it cannot be run, or its environment reads another content.
     """
     candidates, handed_out = (
-        any(rule.scoring == scoring for rule in gate.model.accuracy) for scoring in ("peak", "latest")
+        any(rule.scoring in scorings for rule in gate.model.accuracy)
+        for scorings in (("peak", "presence"), ("latest",))
     )
     capture = ref.open()
     with tempfile.TemporaryDirectory() as folder:

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from uwbbench.api.arrays import IntArray
+from uwbbench.api.arrays import BoolArray, IntArray
 from uwbbench.api.detections import Detections
 from uwbbench.config.rules import Table
 from uwbbench.measure.accuracy.rules import ScoringRules
@@ -16,11 +16,25 @@ from uwbbench.measure.accuracy.scene import Scene
 def in_region(detections: Detections, scene: Scene, rules: ScoringRules, table: Table) -> Detections:
     """Detections of scored frames in the region: those near labelled objects share their objects' place."""
     detections = detections.take(scene.scored[detections.frame])
-    low, high = rules.region.limits_m(scene.header.radar)
     near = np.abs(scene.errors_m(detections, table, rules.surface)) <= rules.gate_m
-    beside = (near & scene.inside(rules.region)[detections.frame]).any(axis=1)
+    return detections.take(beside(detections, near, scene, rules))
+
+
+def beside(detections: Detections, near: BoolArray, scene: Scene, rules: ScoringRules) -> BoolArray:
+    """Which detections (n,) are in the region: those near labelled objects if one of these is, any other by its range.
+
+    Parameters
+    ----------
+    detections : Detections
+    near : (n, objects) bool array
+        Labelled objects that each is near to.
+    scene : Scene
+    rules : ScoringRules
+    """
+    low, high = rules.region.limits_m(scene.header.radar)
+    with_them = (near & scene.inside(rules.region)[detections.frame]).any(axis=1)
     alone = (detections.range_m >= low) & (detections.range_m <= high)
-    return detections.take(np.where(near.any(axis=1), beside, alone))
+    return np.where(near.any(axis=1), with_them, alone)
 
 
 def strongest(detections: Detections, rules: ScoringRules) -> Detections:
