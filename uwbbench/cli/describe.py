@@ -119,7 +119,8 @@ def _detector(name: str) -> dict[str, Any]:
     from uwbbench.detect.pipeline import load_detector
 
     config = load_detector(name).config
-    about = {"description": config.description, "citation": config.citation, **config.to_dict()}
+    reported = [one.model_dump() for one in config.reported]
+    about = {"description": config.description, "citation": config.citation, "reported": reported, **config.to_dict()}
     return {"file": str(find_config("detectors", name)), **about}
 
 
@@ -127,7 +128,7 @@ def detector_yaml(facts: dict[str, Any]) -> str:
     """Detector as a YAML file that could be loaded again, its origin in a comment."""
     import yaml
 
-    order = ("schema", "name", "description", "citation", "fidelity")
+    order = ("schema", "name", "description", "citation", "fidelity", "reported")
     head = {key: facts[key] for key in order if facts[key]}
     text = yaml.safe_dump(head, sort_keys=False, allow_unicode=True, width=110) + "pipeline:\n"
     for step in facts["pipeline"]:

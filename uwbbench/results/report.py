@@ -360,7 +360,7 @@ class Report:
 
     def to_dict(self) -> dict[str, Any]:
         """Everything as plain values, for JSON; undefined numbers are NaN, which the store writes as null."""
-        rows = [about | {name: dataclasses.asdict(one) for name, one in every.items()} for about, every in self.estimates]
+        rows = [about | {name: dataclasses.asdict(e) for name, e in every.items()} for about, every in self.estimates]
         keys = ("kind", "detector", "dataset", "capture", "reason")
         return {
             "run": str(self.folder.path),
