@@ -113,7 +113,7 @@ def test_a_detector_that_needs_a_background_is_given_one_and_says_so_where_there
     line = 'return block.detections["tap"] > self.level'
     made = broken_detector(
         f"{line}\n\n    needs = ports('background')\n\n    def show_background(self, blocks):\n"
-        "        self.level = 0 * sum(len(block.frames) for block in blocks)",
+        "        for block in blocks:\n            self.level = 0.0",
         GOOD,
     )
     results = examine(made, ["stream-equals-batch", "captures-without-background-are-fine"]).results
