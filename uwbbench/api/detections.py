@@ -196,8 +196,8 @@ class Detections:
         if isinstance(self._columns, tuple) and column in self._columns[0]:
             values: NDArray[Any] = self._columns[1][:, 1 + self._columns[0].index(column)]
             return values.view(np.int64) if column in _INTEGER else values
-        values = self.columns.get(column)
-        return np.full(len(self), np.nan) if values is None else values
+        known = self.columns.get(column)
+        return np.full(len(self), np.nan) if known is None else known
 
     @property
     def frame(self) -> IntArray:

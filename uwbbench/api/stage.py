@@ -105,6 +105,11 @@ class Stage(Generic[P]):
         return False
 
     @property
+    def whole_windows(self) -> bool:
+        """Whether the stage answers for a window of frames as a whole, so that its answer hangs on all of them."""
+        return False
+
+    @property
     def resolves_taps(self) -> float:
         """Largest distance at which two equal echoes are not taken for noise by each other, by how the method works."""
         return math.inf

@@ -107,13 +107,12 @@ def info(capture: options.CaptureFile, json: options.Json = False) -> None:
         render.print_json(content)
         return
     label = "SIMULATED" if content["source"] == "simulated" else content["source"]
-    about = {key: content[key] for key in ("name", "description", "license", "citation")}
+    about = {key: content[key] for key in ("name", "description", "license", "citation", "recording", "robot")}
+    if about["recording"] == about["name"]:
+        del about["recording"]
     render.print_facts({"capture": about.pop("name"), "source": label, **about, "radar": content["radar"]["text"]})
-    rows = []
-    for receiver in content["receivers"]:
-        facts = describe.receiver_text(receiver)
-        rows.append(list(facts.values()))
-    render.print_table("receivers", list(facts), rows)
+    texts = describe.receiver_texts(content["receivers"])
+    render.print_table("receivers", list(texts[0]), [list(text.values()) for text in texts])
     truth = content["truth"]
     if truth is None:
         typer.echo("no ground truth: detectors can run on it, but it cannot be scored")

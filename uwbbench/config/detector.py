@@ -151,6 +151,9 @@ class DetectorConfig:
 KERNEL = "kernel "
 """What the names of kernels begin with among the names of sources."""
 
+REFERENCE = "reference"
+"""Fidelity of what stands beside detectors for comparison."""
+
 RESULTS_FILE = "results file"
 """Fidelity of a detector that is known by what it has written alone, and how tables mark its rows."""
 
@@ -163,9 +166,30 @@ def from_results(config: Mapping[str, Any]) -> bool:
     return bool(config.get("fidelity") == RESULTS_FILE)
 
 
-def marked(name: str, *, results_file: bool) -> str:
-    """Name of a detector as tables show it, which say so where its rows are read from a file."""
-    return f"{name} ({RESULTS_FILE})" if results_file else name
+BOUND = "bound"
+"""How tables mark the rows of what is no detector, but bounds what detectors can reach."""
+
+
+def is_bound(config: DetectorConfig) -> bool:
+    """Whether it only bounds what detectors can reach: it or a stage of it is a reference, or reads the truth."""
+    stages = [registry.load_plugin("stages", step.use) for step in config.steps]
+    seeing = any("truth" in stage.needs or stage.fidelity == REFERENCE for stage in stages)
+    return seeing or config.fidelity == REFERENCE
+
+
+def marked(name: str, *, results_file: bool = False, bound: bool = False) -> str:
+    """Name of a detector as tables show it.
+
+    Parameters
+    ----------
+    name : str
+    results_file : bool
+        Whether its rows are read from a file.
+    bound : bool
+        Whether it bounds what detectors can reach, and is none.
+    """
+    marks = [*([RESULTS_FILE] if results_file else []), *([BOUND] if bound else [])]
+    return f"{name} ({', '.join(marks)})" if marks else name
 
 
 def detector_identity(config: Mapping[str, Any], sources: Mapping[str, str]) -> str:
