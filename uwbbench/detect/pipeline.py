@@ -17,7 +17,7 @@ from uwbbench.api.detections import COLUMNS, Detections
 from uwbbench.api.errors import ConfigError, PluginError
 from uwbbench.api.frames import BATCH_FRAMES
 from uwbbench.api.kernel import Kernel
-from uwbbench.api.learning import Trainable
+from uwbbench.api.learning import LearnedParams
 from uwbbench.api.radar import Radar
 from uwbbench.api.stage import Stage
 from uwbbench.api.weights import load_weights
@@ -160,7 +160,7 @@ class Pipeline:
         return steps if until is None else steps[: [step.label for step in steps].index(until)]
 
     def _load_weights(self, stage: Stage[Any], label: str, radar: Radar) -> None:
-        if not isinstance(stage, Trainable):
+        if not isinstance(stage.params, LearnedParams):  # asked for every stage: a protocol is slow to tell
             return
         try:
             load_weights(stage, radar, self.steps_before(label, radar.channel))
