@@ -43,7 +43,7 @@ def test_a_run_on_a_training_capture_is_refused_before_anything_runs(tmp_path):
     with pytest.raises(
         ConfigError,
         match=r"detector 'coupling-extra-trees' was trained on recordings that would be scored: "
-        r"'simulated: coupling-outdoor/target-metal/3' \(there 'outdoor: coupling-outdoor/target-metal/3'\)",
+        r"'simulated 2: coupling-outdoor/target-metal/3' \(there 'outdoor: coupling-outdoor/target-metal/3'\)",
     ):
         run_experiment(experiment, tmp_path / "run")
     assert not (tmp_path / "run").exists()

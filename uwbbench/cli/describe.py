@@ -239,24 +239,30 @@ def _receiver_text(receiver: dict[str, Any], with_background: bool) -> dict[str,
 
 
 def checked_file(path: Path) -> str:
-    """Summary of a detector, experiment, scene, gate, tuning, fit or robot file that passed all checks.
+    """Summary of a detector, experiment, scene, gate, tuning, training, fit or robot file that passed all checks.
 
     Raises
     ------
     ConfigError, PluginError
-        If it is wrong, or none of the seven.
+        If it is wrong, or none of the eight.
     """
     from uwbbench.config.source import open_dataset
     from uwbbench.detect.pipeline import load_detector
     from uwbbench.run.experiment import read_experiment
     from uwbbench.tools.fit import read_fit
     from uwbbench.tools.gate import read_gate
+    from uwbbench.tools.train import read_training
     from uwbbench.tools.tune import read_tuning
 
     keys = read_yaml(path).data
     if "tuning" in keys:
         tuning = read_tuning(path)
         return f"tuning '{tuning.name}', {len(tuning.tuning)} datasets to tune on, fine"
+    if "training" in keys:
+        training = read_training(path)
+        return (
+            f"training '{training.name}' of {training.step.use}, {len(training.training)} datasets to learn from, fine"
+        )
     if "cells" in keys:
         fit = read_fit(path)
         return f"fit '{fit.name}', {len(fit.start)} parameters, {len(fit.targets)} targets, fine"
@@ -275,12 +281,13 @@ def checked_file(path: Path) -> str:
     if "channels" in keys:
         robot = registry.load_plugin("datasets", registry.default("dataset.scenes")).read_robot(path).model
         return f"robot '{robot.name}' on channels {', '.join(map(str, robot.channels))}, fine"
-    first_keys = ["pipeline", "extends", "detectors", "datasets", "terms", "head", "tuning", "cells", "channels"]
+    first_keys = ["pipeline", "extends", "detectors", "datasets", "terms", "head", "tuning", "training", "cells"]
+    first_keys.append("channels")
     near = [nearest(str(key), first_keys) for key in keys if key != "schema"]
     hint = next((text for text in near if text.startswith(" Did")), "")
     kinds = (
         "a detector ('pipeline' or 'extends'), an experiment ('detectors'), a scene ('terms'), a gate ('head'), a "
-        "tuning ('tuning'), a fit ('cells') nor a robot ('channels')"
+        "tuning ('tuning'), a training ('training'), a fit ('cells') nor a robot ('channels')"
     )
     raise ConfigError(f"{path}: neither {kinds}.{hint}")
 

@@ -32,6 +32,7 @@ class File(StrEnum):
     SCENE = "scene"
     GATE = "gate"
     TUNING = "tuning"
+    TRAINING = "training"
     FIT = "fit"
     ROBOT = "robot"
 
@@ -129,7 +130,8 @@ def _object_text(obstacle: dict[str, Any]) -> str:
 
 def validate(
     files: Annotated[
-        list[Path], typer.Argument(metavar="FILE...", help="Detector, experiment, scene, gate, tuning or fit.")
+        list[Path],
+        typer.Argument(metavar="FILE...", help="Detector, experiment, scene, gate, tuning, training, fit."),
     ],
 ) -> None:
     """Check files: detectors, experiments, scenes, fits, gates. Mistakes are named with file, line and key."""
@@ -161,6 +163,7 @@ def schema(
         gate_schema,
         robot_schema,
         scene_schema,
+        training_schema,
         tuning_schema,
     )
 
@@ -170,6 +173,7 @@ def schema(
         File.SCENE: scene_schema,
         File.GATE: gate_schema,
         File.TUNING: tuning_schema,
+        File.TRAINING: training_schema,
         File.FIT: fit_schema,
         File.ROBOT: robot_schema,
     }

@@ -60,7 +60,8 @@ def test_what_was_trained_is_written_with_a_summary_and_runs(tmp_path):
     detector = tmp_path / "mine.yaml"
     values = "{trees: 8, min_samples_leaf: 3, weights: mine.safetensors}"
     detector.write_text(
-        f"schema: 1\nextends: coupling-extra-trees\nname: mine\nset: {{pipeline.classify.trees.params: {values}}}\n"
+        f"schema: 1\nextends: coupling-extra-trees\nname: mine\nset:\n  pipeline.classify.trees.params: {values}\n"
+        "  pipeline.filter.probability.params.minimum: 0\n"
     )
     training = read_training(file())
     (_, one, _), *_ = _captures(training, lambda _: None)
