@@ -15,7 +15,7 @@ from uwbbench.show.page.limits_section import limits
 from uwbbench.show.page.section import Section
 from uwbbench.show.text.report import Tables
 from uwbbench.show.text.sheet import sentence, shown
-from uwbbench.show.text.wording import set_aside_warning
+from uwbbench.show.text.wording import TRACK_ERRORS, set_aside_warning
 
 if TYPE_CHECKING:
     from uwbbench.show.page.content import Content
@@ -60,12 +60,13 @@ def leaderboard(content: Content) -> Section | None:
     if not content.boards:
         return None
     confidence = f"{content.report.experiment['intervals']['confidence']:.0%}"
-    notes = (
+    note = (
         f"Value, and below it its {confidence} interval. {INTERVALS} Errors are those of all retained detections; "
         "\u201cof matches\u201d counts true positives only: read it with recall. n/a: undefined. Times of a frame are "
-        f"{content.report.timed}; absolute ones hold on one machine only, the ratio travels.",
+        f"{content.report.timed}; absolute ones hold on one machine only, the ratio travels."
     )
-    return Section("leaderboard", "Leaderboard", layout="leaderboard", notes=notes)
+    tracks = [TRACK_ERRORS] if any(board[2] == "track" for board in content.boards) else []
+    return Section("leaderboard", "Leaderboard", layout="leaderboard", notes=(note, *tracks))
 
 
 def pareto(content: Content) -> Section | None:

@@ -21,7 +21,7 @@ from uwbbench.show.text.paper_sheets import paper_sheets, published_sheets
 from uwbbench.show.text.quantity import Quantity, undefined_titles
 from uwbbench.show.text.reported_sheets import reported_sheets
 from uwbbench.show.text.sheet import Sheet, escaped, sentence, shown
-from uwbbench.show.text.wording import TABLES, set_aside_warning
+from uwbbench.show.text.wording import ERRORS, TABLES, TRACK_ERRORS, set_aside_warning
 
 
 def sheets(report: Report) -> list[Sheet]:
@@ -200,7 +200,7 @@ def _leaderboard_notes(
 ) -> Iterator[str]:
     open_world = any(not about["exhaustive"] for about, _ in members)
     main = quantities[metrics.ranking(exhaustive=not open_world)]
-    yield "Errors are those of all retained detections; 'of matches' counts true positives only: read it with recall."
+    yield TRACK_ERRORS if members[0][0]["scoring"] == "track" else ERRORS
     if metrics.listed:
         yield f"Ranked by {main.title}."
     if open_world:
