@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from uwbbench.results.verdicts import INTERVALS
+from uwbbench.results.verdicts import BOUNDS, INTERVALS
 from uwbbench.show.page import answer, error_sections, limits_section
 from uwbbench.show.page.limits_section import limits
 from uwbbench.show.page.section import Section
@@ -66,7 +66,8 @@ def leaderboard(content: Content) -> Section | None:
         f"{content.report.timed}; absolute ones hold on one machine only, the ratio travels."
     )
     tracks = [TRACK_ERRORS] if any(board[2] == "track" for board in content.boards) else []
-    return Section("leaderboard", "Leaderboard", layout="leaderboard", notes=(note, *tracks))
+    bounds = [BOUNDS] if content.report.bounds else []
+    return Section("leaderboard", "Leaderboard", layout="leaderboard", notes=(note, *tracks, *bounds))
 
 
 def pareto(content: Content) -> Section | None:
