@@ -18,7 +18,7 @@ name: after-source
 reported:
   - {figures: "F1 <b>99</b> %", of: its own hall, source: "Somebody, 2020", metrics: [f1]}
   - {figures: "4 dB", of: its own hall, source: "Somebody, 2020"}
-pipeline: [{use: reference.constant}]
+pipeline: [{use: peaks}, {use: range}]
 """
 
 EXPERIMENT = """\

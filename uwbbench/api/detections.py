@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -196,8 +197,8 @@ class Detections:
         if isinstance(self._columns, tuple) and column in self._columns[0]:
             values: NDArray[Any] = self._columns[1][:, 1 + self._columns[0].index(column)]
             return values.view(np.int64) if column in _INTEGER else values
-        values = self.columns.get(column)
-        return np.full(len(self), np.nan) if values is None else values
+        known = self.columns.get(column)
+        return np.full(len(self), np.nan) if known is None else known
 
     @property
     def frame(self) -> IntArray:
@@ -336,7 +337,7 @@ class Detections:
         if isinstance(self._columns, tuple):
             names, table = ("frame", *self._columns[0]), self._columns[1]
             values = table.tolist()
-            for place in [place for place, name in enumerate(names) if name in _INTEGER]:
+            for place in _whole_places(names):
                 for row, whole in zip(values, table.view(np.int64)[:, place].tolist(), strict=True):
                     row[place] = whole
             return [dict(zip(names, row, strict=True)) for row in values]
@@ -353,3 +354,9 @@ class Detections:
         extra = [name for name in self.columns if name not in COLUMNS]
         table = pd.DataFrame({name: self[name] for name in (*COLUMNS, *extra)})
         return table.astype({"cluster": "Int64", "track": "Int64"})
+
+
+@lru_cache(maxsize=64)
+def _whole_places(names: tuple[str, ...]) -> tuple[int, ...]:
+    """Which of some columns hold whole numbers; kept, as a stream asks for it in every frame."""
+    return tuple(place for place, name in enumerate(names) if name in _INTEGER)

@@ -22,7 +22,7 @@ import numpy as np
 from uwbbench.api.arrays import FloatArray, IntArray
 from uwbbench.measure.accuracy import intervals
 from uwbbench.measure.accuracy.intervals import Interval
-from uwbbench.measure.accuracy.ranked import RankedCounts, pooled
+from uwbbench.measure.accuracy.ranked import RankedCounts, pooled, without_each
 from uwbbench.measure.accuracy.rules import rules_on
 from uwbbench.run.folder.folder import RunFolder
 from uwbbench.run.folder.journal import Entry
@@ -126,7 +126,7 @@ def ranked_curve(parts: Sequence[tuple[RankedCounts, Hashable]], confidence: flo
     members = defaultdict[Hashable, list[RankedCounts]](list)
     for part, scene in parts:
         members[scene].append(part)
-    scenes = [pooled(repeats) for repeats in members.values()]
+    scenes = [repeats[0] if len(repeats) == 1 else pooled(repeats) for repeats in members.values()]
     whole = pooled(scenes)
     rows = _thinned(whole)
     score = whole.score[rows]
@@ -134,8 +134,7 @@ def ranked_curve(parts: Sequence[tuple[RankedCounts, Hashable]], confidence: flo
     there, minutes = np.array([part.there for part in scenes]), np.array([part.duration_s / 60 for part in scenes])
     set_tp, set_fp = (np.array([getattr(part, name) for part in scenes]) for name in ("set_tp", "set_fp"))
     about = there, minutes, whole.exhaustive, confidence
-    alone = len(scenes) == 1
-    left = [] if alone else [pooled([*scenes[:at], *scenes[at + 1 :]]).average_precision for at in range(len(scenes))]
+    left = [] if len(scenes) == 1 else without_each(scenes)
     area = intervals.of_left_out(
         whole.average_precision,
         left or [math.nan],

@@ -13,6 +13,7 @@ from uwbbench.api.arrays import FloatArray
 from uwbbench.api.capture import CaptureHeader
 from uwbbench.api.errors import ScoringError, StoreError
 from uwbbench.api.metric import Outcome
+from uwbbench.api.truth import Sight
 from uwbbench.measure.accuracy.judge import judge, tables_of
 from uwbbench.measure.accuracy.metrics.choice import MetricChoice
 from uwbbench.measure.accuracy.rules import rules_on
@@ -78,6 +79,7 @@ def scored(folder: RunFolder) -> list[Scored]:
 
 def _scored(folder: RunFolder, rows: Mapping[Any, Any], rules: Sequence[ScoringRules]) -> Iterator[Scored]:
     headers: dict[str, CaptureHeader] = {}
+    sights: dict[str, Sight] = {}
     for entry in folder.entries():
         if entry.kind != "accuracy" or entry.status != "done":
             continue
@@ -85,9 +87,10 @@ def _scored(folder: RunFolder, rows: Mapping[Any, Any], rules: Sequence[ScoringR
             headers[entry.capture_id] = folder.header(entry.capture_id)
         detections, header = folder.detections(entry.unit), headers[entry.capture_id]
         try:
-            scene = Scene.of(detections, header)
+            scene = Scene.of(detections, header, sights.get(entry.capture_id))
         except ScoringError:  # its reason is in the stored scores
             continue
+        sights[entry.capture_id] = scene.sight
         for rule in rules_on(rules, entry.dataset):
             try:
                 names = tables_of(detections, rule.scoring)
@@ -145,6 +148,21 @@ def estimates_of(metrics: MetricChoice, members: Sequence[Scored], settings: Map
         if known:
             estimates[name] = Estimate(float(np.mean(known)), math.nan, math.nan, len(known), estimates[name].groups)
     return estimates
+
+
+def columns_of(estimates: Mapping[str, Estimate]) -> dict[str, float]:
+    """Values, ends of the intervals and counts of samples, as columns of a table."""
+    columns: dict[str, float] = {}
+    for name, estimate in estimates.items():
+        columns |= {
+            name: estimate.value,
+            f"{name}_low": estimate.low,
+            f"{name}_high": estimate.high,
+            f"{name}_n": estimate.n,
+            f"{name}_outer_low": estimate.outer_low,
+            f"{name}_outer_high": estimate.outer_high,
+        }
+    return columns
 
 
 def scenes_of(scored: Iterable[Scored]) -> dict[str, str]:

@@ -20,7 +20,7 @@ from joblib import Parallel, delayed
 
 from uwbbench.api.errors import StoreError, UwbbenchError
 from uwbbench.api.interruption import by_plugin, listening
-from uwbbench.config.detector import DetectorConfig, detector_identity, read_detector
+from uwbbench.config.detector import DetectorConfig, detector_identity, is_bound, read_detector
 from uwbbench.config.seeds import HIDDEN
 from uwbbench.detect.pipeline import Pipeline
 from uwbbench.detect.results_folder import ResultsFolder
@@ -149,7 +149,7 @@ def _reported(experiment: Experiment) -> dict[str, Any]:
 
 
 def _code(experiment: Experiment, todo: Plan) -> dict[str, Any]:
-    """Identities of the detectors and of the reference of times, and hashes of what their results come from."""
+    """What detectors and the reference of times are: identities, hashes of what they come from, and who is a bound."""
     sources: dict[str, str] = {}
     for config in experiment.detectors:
         if config.results is None:
@@ -163,6 +163,7 @@ def _code(experiment: Experiment, todo: Plan) -> dict[str, Any]:
     return {
         "detectors": {config.name: detector_identity(config.to_dict(), sources) for config in experiment.detectors},
         "sources": sources,
+        "bounds": [config.name for config in experiment.detectors if is_bound(config)],
         "reference": reference,
     }
 

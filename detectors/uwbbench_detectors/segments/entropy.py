@@ -66,7 +66,7 @@ class EntropyParams(Params):
             return int(getattr(self, f"{name}_taps"))
         taps = round(pulses / (radar.bandwidth_hz * radar.sample_interval_s))
         least: int = {"merge": 0, "tail": 4}.get(name, 1)
-        return max(taps, least)
+        return max(int(taps), least)
 
 
 class EntropySegments(Stage[EntropyParams]):

@@ -188,6 +188,7 @@ class Content:
         ]
         return {
             "detectors": list(self.detectors.values()),
+            "bounds": [name in self.report.bounds for name in self.report.detectors],
             "marks": [[one.path, one.colour] for one in self.marks.values()],
             "quantities": [vars(quantity) for quantity in self.quantities.values()],
             "boards": [self._board(board, materials) for board in boards],

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from uwbbench.results.verdicts import INTERVALS
+from uwbbench.results.verdicts import BOUNDS, INTERVALS
 from uwbbench.show.page import answer, error_sections, limits_section
 from uwbbench.show.page.limits_section import limits
 from uwbbench.show.page.section import Section
@@ -60,11 +60,12 @@ def leaderboard(content: Content) -> Section | None:
     if not content.boards:
         return None
     confidence = f"{content.report.experiment['intervals']['confidence']:.0%}"
-    notes = (
+    notes: tuple[str, ...] = (
         f"Value, and below it its {confidence} interval. {INTERVALS} Errors are those of all retained detections; "
         "\u201cof matches\u201d counts true positives only: read it with recall. n/a: undefined. Times of a frame are "
         f"{content.report.timed}; absolute ones hold on one machine only, the ratio travels.",
     )
+    notes += (BOUNDS,) if content.report.bounds else ()
     return Section("leaderboard", "Leaderboard", layout="leaderboard", notes=notes)
 
 
