@@ -141,7 +141,7 @@ def _without_defaults(step: dict[str, Any]) -> dict[str, Any]:
     kept = {"use": step["use"]}
     if step["as"] != step["use"]:
         kept["as"] = step["as"]
-    return kept | {key: step[key] for key in ("params", "optional") if step[key]}
+    return kept | {key: step[key] for key in ("params", "optional", "unless") if step.get(key)}
 
 
 def capture_file(path: Path) -> dict[str, Any]:

@@ -36,6 +36,11 @@ class StepModel(BaseModel):
     optional: bool = Field(
         False, description="Leave the stage out, with a note, where the capture lacks what it needs (such as STS)."
     )
+    unless: str | None = Field(
+        None,
+        description="Name of an optional step before this one, in whose place it stands: left out where that one is "
+        "in use.",
+    )
 
 
 class DetectorModel(BaseModel):
@@ -73,6 +78,8 @@ class Step:
         Raw parameters; values may depend on the channel.
     optional : bool
         May be left out where the capture lacks what the stage needs.
+    unless : str
+        Label of the optional step before it in whose place it stands; empty for none.
     place : str
         File, line and key it was read from, for messages.
     implied_by : str
@@ -83,6 +90,7 @@ class Step:
     label: str
     params: dict[str, Any] = field(default_factory=dict)
     optional: bool = False
+    unless: str = ""
     place: str = field(default="", compare=False)
     implied_by: str = field(default="", compare=False)
 
@@ -143,7 +151,11 @@ class DetectorConfig:
 
     def here(self) -> dict[str, Any]:
         """Resolved file as plain values that another process on this machine can read, files that it names included."""
-        steps = [{"use": s.use, "as": s.label, "params": s.params, "optional": s.optional} for s in self.steps]
+        steps = [
+            {"use": s.use, "as": s.label, "params": s.params, "optional": s.optional}
+            | ({"unless": s.unless} if s.unless else {})
+            for s in self.steps
+        ]
         score = {"score": self.score} if self.score else {}
         return {"schema": 1, "name": self.name, "fidelity": self.fidelity, **score, "pipeline": steps}
 
@@ -260,7 +272,8 @@ def check_detector(data: Mapping[str, Any], source: YamlFile) -> DetectorConfig:
                 f"{source.place(('pipeline', index))}: step '{label}' appears twice; name one of them with 'as'"
             )
         params = _with_named_channels(item.params, source, index)
-        step = Step(item.use, label, params, item.optional, source.place(("pipeline", index)))
+        step = Step(item.use, label, params, item.optional, item.unless or "", source.place(("pipeline", index)))
+        _check_unless(step, steps)
         _check_params(step, source, index)
         steps.append(step)
     steps = _completed(steps)
@@ -272,6 +285,16 @@ def check_detector(data: Mapping[str, Any], source: YamlFile) -> DetectorConfig:
     _check_score(model.score, steps, source)
     about = model.description, model.citation, model.fidelity
     return DetectorConfig(model.name, tuple(steps), *about, model.score or "", reported=tuple(model.reported))
+
+
+def _check_unless(step: Step, before: list[Step]) -> None:
+    """Check that a step stands in the place of one that may be left out."""
+    if not step.unless:
+        return
+    optional = [one.label for one in before if one.optional]
+    if step.unless not in optional:
+        known = f"{nearest(step.unless, optional)} There are: {', '.join(optional) or 'none'}"
+        raise ConfigError(f"{step.place}: unless: no optional step '{step.unless}' before '{step.label}'.{known}")
 
 
 def _check_score(score: str | None, steps: list[Step], source: YamlFile) -> None:

@@ -134,11 +134,15 @@ class Pipeline:
         for step in self._steps(until):
             cls = registry.load_plugin("stages", step.use)
             params, fallen = step.params_for(radar.channel)
+            if step.unless and step.unless in {one.label for one in chosen}:
+                notes.append(f"left out, as '{step.unless}' is in use: {step.label}")
+                continue
             if step.implied_by:
                 notes.append(f"{step.label}: put before '{step.implied_by}', which needs it, with its defaults")
             given = f"channel {radar.channel}" if radar.channel else "a capture without channel"
             notes += [f"{step.label}: no {name} for {given}, used {params[name]}" for name in fallen]
-            lacks = [_NEEDS.get(need, need) for need in sorted(cls.needs - has)]
+            checked = cls.params_type().model_validate(params)
+            lacks = [_NEEDS.get(need, need) for need in sorted(cls.needs_with(checked) - has)]
             lacks += [missing.get(port, port) for port in sorted(cls.consumes - available)]
             lacks = list(dict.fromkeys(lacks))
             if lacks and step.optional:
@@ -149,7 +153,7 @@ class Pipeline:
             if lacks:
                 where = f"detector '{self.name}', step '{step.label}'"
                 raise ConfigError(f"{where}: capture '{capture.name}' has no {', no '.join(lacks)}")
-            chosen.append(Chosen(step.label, cls, cls.params_type().model_validate(params), self._load_weights))
+            chosen.append(Chosen(step.label, cls, checked, self._load_weights))
             available = (available - cls.removes) | cls.produces
         notes += [f"left out, as the capture has no {reason}: {', '.join(names)}" for reason, names in left_out.items()]
         return opened(chosen, capture, background), notes

@@ -11,7 +11,6 @@ from pydantic import Field, model_validator
 from uwbbench.api import Block, ComplexArray, IntArray, Params, Radar
 from uwbbench_detectors.clutter.background import LEAST_FRAMES, ClutterRemoval, frames_within
 from uwbbench_detectors.clutter.svd import MOST_FRAMES
-from uwbbench_detectors.parts import between
 
 TOLERANCE = 1e-7
 """Largest part of a window, in the norm of Frobenius, by which the two parts may miss it."""
@@ -80,6 +79,8 @@ class RobustClutter(ClutterRemoval[RobustClutterParams]):
     their lengths are not known here.
     """
 
+    fidelity = "reconstruction"
+
     @property
     def every_nth(self) -> bool:
         """Whether frames come out in groups."""
@@ -137,8 +138,8 @@ class RobustClutter(ClutterRemoval[RobustClutterParams]):
             self._window = np.concatenate([self._window, samples[group]])[-self._frames :]
             if len(self._window) >= LEAST_FRAMES:
                 cleaned[group] = robust_parts(self._window, self.params.sparsity, self.params.rho)[1][-len(group) :]
-        ready = between(held, 0, stop)
-        self._held, self._marked = between(held, stop, len(held.frames)), self._marked[stop:]
+        ready = held.cut(0, stop)
+        self._held, self._marked = held.cut(stop, len(held.frames)), self._marked[stop:]
         return ready.replace(frames=ready.frames.with_preamble(cleaned))
 
 

@@ -7,7 +7,7 @@ from typing import ClassVar
 import numpy as np
 from pydantic import Field
 
-from uwbbench.api import Block, BoolArray, Detections, Filter, FloatArray, Params, RankFilter, RankParams, ports
+from uwbbench.api import Block, BoolArray, Detections, Filter, FloatArray, Params, Radar, RankFilter, RankParams, ports
 
 
 class SelectionParams(RankParams):
@@ -45,6 +45,10 @@ class Nearest(RankFilter[SelectionParams]):
         return (detections["tap"],)
 
 
+LEAST_SHARE = 0.1
+"""Share of the frames that must hold a detection where something moves."""
+
+
 class FirstAboveParams(Params):
     """How strong the nearest detection must be."""
 
@@ -69,10 +73,25 @@ class FirstAbove(Filter[FirstAboveParams]):
     consumes: ClassVar[frozenset[str]] = ports("detections", "amplitude", "tap")
     fidelity = "reconstruction"
 
+    def open(self, radar: Radar) -> None:
+        """Start counting."""
+        super().open(radar)
+        self._valid = self._filled = 0
+
+    def flush(self) -> None:
+        """Say so if there was next to nothing to select from."""
+        if self._filled < LEAST_SHARE * self._valid:
+            self.note(
+                f"select.first_above: detections in only {self._filled} of {self._valid} frames; behind a removal of "
+                "clutter nothing is left of what stands still"
+            )
+
     def keep(self, block: Block) -> BoolArray:
         """Mask of one detection a frame."""
         found = block.detections
         frames, place = np.unique(found.frame, return_inverse=True)
+        self._valid += int(np.count_nonzero(block.frames.valid))
+        self._filled += len(frames)
         amplitude = found["amplitude"]
         largest = np.full(len(frames), -np.inf)
         np.fmax.at(largest, place, amplitude)

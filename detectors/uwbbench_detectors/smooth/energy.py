@@ -70,10 +70,7 @@ class EnergySmoothing(Stage[EnergySmoothingParams]):
 
     def step(self, block: Block) -> Block:
         """Block with smoothed frames."""
-        amplitude = block.frames.amplitude
-        largest = amplitude.max(axis=1, keepdims=True)
-        unit = np.where(largest > 0, largest, 1.0)  # squares of very small samples would vanish
-        energy = (amplitude / unit) ** 2
+        energy = block.frames.amplitude**2
         total, count = energy.copy(), np.ones(energy.shape[1])
         # Added one by one: differences of running sums would lose weak taps behind strong ones.
         for away in range(1, self._taps // 2 + 1):
@@ -81,5 +78,4 @@ class EnergySmoothing(Stage[EnergySmoothingParams]):
             total[:, :-away] += energy[:, away:]
             count[away:] += 1
             count[:-away] += 1
-        smoothed = np.sqrt(total / count) * unit
-        return block.replace(frames=block.frames.with_preamble(smoothed.astype(np.complex128)))
+        return block.replace(frames=block.frames.with_preamble(np.sqrt(total / count).astype(np.complex128)))

@@ -8,7 +8,6 @@ import numpy as np
 from pydantic import Field, field_validator
 
 from uwbbench.api import Block, FloatArray, Params, Radar, Stage, ports
-from uwbbench_detectors.parts import between
 
 
 class MedianSmoothingParams(Params):
@@ -67,10 +66,11 @@ class MedianSmoothing(Stage[MedianSmoothingParams]):
         if not self._held:
             self._out = first
         stop = max(first + len(joined.frames) - behind, self._out)
-        ready = between(joined, self._out - first, stop - first)
+        ready = joined.cut(self._out - first, stop - first)
         ready = ready.with_columns(range_m=self._medians(joined, ready))
         kept = max(stop - self.params.frames // 2, first)
-        self._held = [between(joined, kept - first, len(joined.frames))]
+        held = joined.cut(kept - first, len(joined.frames))
+        self._held = [held.replace(detections=held.detections.annotated(processed=held.frames.index))]
         self._out = stop
         return ready
 

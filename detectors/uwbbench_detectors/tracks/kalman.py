@@ -120,12 +120,14 @@ class KalmanTrack(Stage[KalmanTrackParams]):
         }
         self._settings = np.zeros(state.SETTINGS)
         self._settings[list(settings)] = list(settings.values())
-        self._azimuth = state.AZIMUTH
+        self._azimuth, self._numbered = state.AZIMUTH, state.NEXT
+        self._seen = False
         self._given: tuple[str, ...] = ()
 
     def step(self, block: Block) -> Block:
         """Block whose detections are tracks."""
         frames, rows = block.frames, block.detections
+        self._seen |= len(frames) > 0
         if rows.names != self._given:
             self._look_at(rows)
         place_m, yaw_rad = frames.odometry_position_m, frames.odometry_yaw_rad
@@ -146,6 +148,15 @@ class KalmanTrack(Stage[KalmanTrackParams]):
         self._tracks, table = self._follow(self._tracks, self._carried, clock, found, self._settings, frames.first)
         tracks = Detections.of_table(self._names, table, (frames.first, frames.valid), rows.notes)
         return block.replace(detections=tracks)
+
+    def flush(self) -> None:
+        """Say so if nothing was tracked."""
+        if self._seen and not self._carried[self._numbered]:
+            hits, frames = self.params.confirm
+            self.note(
+                f"track.kalman: no track: nowhere did {hits} detections within {frames} frames lie near each other; "
+                "behind a background of past frames nothing is left of what stands still"
+            )
 
     def _look_at(self, rows: Detections) -> None:
         """Settle which columns tracks take over."""

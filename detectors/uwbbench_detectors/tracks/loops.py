@@ -118,7 +118,7 @@ def _begin(track: FloatArray, detection: FloatArray, row: int, carried: FloatArr
     """
     track[:] = 0
     track[RANGE], track[RANGE_VARIANCE], track[RATE_VARIANCE] = detection[1], at[VARIANCE], at[START_RATE_VARIANCE]
-    track[NUMBER] = -1
+    track[NUMBER], track[FRAMES] = -1, 1
     _hit(track, detection, row, carried, at)
 
 

@@ -48,6 +48,11 @@ class StageSubject(ClassSubject):
         return working_params(self.cls.params_type(), self.given, f"stage '{self.name}'", self.name)
 
     @property
+    def needs(self) -> frozenset[str]:
+        """What it needs of a capture with these parameters."""
+        return frozenset(self.cls.needs_with(self.params))
+
+    @property
     def capture(self) -> Capture:
         """The usual capture."""
         return usual_capture()
@@ -75,7 +80,7 @@ class StageSubject(ClassSubject):
         stage.open(capture.radar)
         if "truth" in self.cls.needs and capture.truth is not None:
             stage.show_truth(capture.truth, capture.trajectory)
-        if "background" in self.cls.needs and capture.background is not None:
+        if "background" in self.needs and capture.background is not None:
             background = self.declared(behind_all(capture.background, self.cls.consumes))
             stage.show_background(iter(pieces(background, cuts)))
 
@@ -91,7 +96,7 @@ class StageSubject(ClassSubject):
 
     def declared(self, block: Block) -> Block:
         """Block with nothing but what this stage declares that it consumes and needs."""
-        return declared_parts(block, self.cls.consumes, self.cls.needs)
+        return declared_parts(block, self.cls.consumes, self.needs)
 
     def run(self, block: Block, cuts: Sequence[int] = (), stage: Stage[Any] | None = None) -> Values:
         """What the stage yields for a block handed over in pieces, the flush included.
