@@ -65,8 +65,7 @@ class EntropyParams(Params):
         if pulses is None:
             return int(getattr(self, f"{name}_taps"))
         taps = round(pulses / (radar.bandwidth_hz * radar.sample_interval_s))
-        least: int = {"merge": 0, "tail": 4}.get(name, 1)
-        return max(taps, least)
+        return max(int(taps), {"merge": 0, "tail": 4}.get(name, 1))
 
 
 class EntropySegments(Stage[EntropyParams]):
@@ -91,8 +90,8 @@ class EntropySegments(Stage[EntropyParams]):
 
     References
     ----------
-    A. Mimouna et al., "Entropy-based Ultra-Wide Band radar signals segmentation for multi obstacle detection", IEEE
-    Sensors Journal, 2021; O. Vasicek, J. Royal Statistical Society B 38(1), 1976 (estimator).
+    A. Mimouna et al., "Entropy-based Ultra-Wide Band radar signals segmentation for multi obstacle detection",
+    2021; O. Vasicek, J. Royal Statistical Society B 38(1), 1976 (estimator).
     """
 
     consumes: ClassVar[frozenset[str]] = ports("frames", "first_path")
