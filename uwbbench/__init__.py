@@ -19,7 +19,8 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from uwbbench.api.capture_file import open_capture, write_capture
+    from uwbbench.api.capture_file import open_capture
+    from uwbbench.api.capture_writing import write_capture
     from uwbbench.api.registry import register
     from uwbbench.detect.pipeline import detector_from_yaml, load_detector
     from uwbbench.detect.results_file import read_results
@@ -55,7 +56,7 @@ __all__ = [
 _LIBRARY = "uwbbench.tools.library"
 _HOME = {
     "open_capture": "uwbbench.api.capture_file",
-    "write_capture": "uwbbench.api.capture_file",
+    "write_capture": "uwbbench.api.capture_writing",
     "register": "uwbbench.api.registry",
     "calibrate": "uwbbench.measure.calibration",
     "detector_from_yaml": "uwbbench.detect.pipeline",

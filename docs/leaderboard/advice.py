@@ -9,11 +9,9 @@ import numpy as np
 import pandas as pd
 from tables import Board
 
-import uwbbench
 from uwbbench.measure.accuracy.metrics.choice import MetricChoice
-from uwbbench.results.results import scored
 from uwbbench.results.slices import ALL, Slice, slices
-from uwbbench.run.folder import RunFolder
+from uwbbench.tools.leaderboard import Leaderboard
 
 DISTANCES_M = (0.5, 1.0, 2.0, 3.5)
 BUDGETS = (3.0, 10.0, 100.0)
@@ -41,7 +39,7 @@ SITUATIONS = {
 }
 
 
-def advice_text(board: Board, run: uwbbench.Run) -> str:
+def advice_text(board: Board, combined: Leaderboard) -> str:
     """The block of the page."""
     lines = [
         f"From suite `{board.name}`, version {board.version[:12]}: all of it is **simulated**, and a detector that is "
@@ -62,7 +60,7 @@ def advice_text(board: Board, run: uwbbench.Run) -> str:
                 f"| {said} | {' | '.join(_advice(board.of(dataset), board.detectors))} |" for said, dataset in there
             ]
             lines.append("")
-    lines += ["## By distance", "", *_by_distance(board, run), ""]
+    lines += ["## By distance", "", *_by_distance(board, combined), ""]
     lines += ["## By budget", "", *_by_budget(board), ""]
     lines += ["## All detectors of the suite", "", *_all(board)]
     return "\n".join(lines)
@@ -81,13 +79,14 @@ def _with_interval(row: pd.Series) -> str:
     return f"{row['f1']:.2f} [{row['f1_low']:.2f}, {row['f1_high']:.2f}]"
 
 
-def _by_distance(board: Board, run: uwbbench.Run) -> Iterator[str]:
+def _by_distance(board: Board, combined: Leaderboard) -> Iterator[str]:
     """Recall by range, as the false detections of a frame belong to no distance; of approaches, by material."""
     datasets = [name for name in ("metal", "concrete", "plywood") if name in board.datasets]
     metric = MetricChoice()["recall"]
     members = [
         one
-        for one in scored(RunFolder(run.path))
+        for run in combined.content.runs
+        for one in run.scored
         if one.dataset in datasets and one.table == "filtering" and one.detector in board.detectors
     ]
     known: dict[object, dict[str, object]] = defaultdict(dict)

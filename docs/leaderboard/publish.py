@@ -20,13 +20,12 @@ from tables import board_of, readme_text
 
 import uwbbench
 from uwbbench.api.locate import shipped
-from uwbbench.results import Report
 from uwbbench.run.experiment import read_experiment
 from uwbbench.run.suite import read_frozen
 from uwbbench.show.charts.theme import PRINT
-from uwbbench.show.page import Content
-from uwbbench.show.page.board_charts import pareto
 from uwbbench.show.page.render import FIGURE_WIDTH
+from uwbbench.show.site.charts import pareto
+from uwbbench.tools.leaderboard import Leaderboard
 
 SUITE = "robot-1"
 DOCS = Path(__file__).parents[1]
@@ -46,24 +45,23 @@ def main(folder: Path, *, check: bool) -> int:
     if check:
         shutil.rmtree(run, ignore_errors=True)
     words = ["--resume" if (run / "manifest.json").is_file() else "--out", run]
-    _uwbbench("run", SUITE, *(["--quick"] if check else []), *words)
-    _uwbbench("leaderboard", run, "-o", folder / ("site-quick" if check else "site"))
-    return _checked(uwbbench.open_run(run)) if check else _published(uwbbench.open_run(run), folder)
+    command = [sys.executable, "-m", "uwbbench.cli", "run", SUITE, *(["--quick"] if check else []), *map(str, words)]
+    subprocess.run(command, check=True)  # noqa: S603 - fixed words
+    opened = uwbbench.open_run(run)
+    site = folder / ("site-quick" if check else "site")
+    combined = uwbbench.leaderboard([opened], site, progress=lambda text: print(text, file=sys.stderr))  # noqa: T201
+    return _checked(opened) if check else _published(opened, combined, folder)
 
 
-def _uwbbench(*words: object) -> None:
-    subprocess.run([sys.executable, "-m", "uwbbench.cli", *map(str, words)], check=True)  # noqa: S603 - fixed words
-
-
-def _published(run: uwbbench.Run, folder: Path) -> int:
+def _published(run: uwbbench.Run, combined: Leaderboard, folder: Path) -> int:
     """Write everything that is made of a full run."""
-    board = board_of(run)
+    board = board_of(run, combined)
     _replace(README, readme_text(board))
-    _replace(PAGE, advice_text(board, run))
+    _replace(PAGE, advice_text(board, combined))
     counts, quick = _counts(run), _quick()
     kept = [key in quick for key in zip(counts["dataset"], counts["capture"], strict=True)]
     counts[kept].to_csv(SCORES, index=False)
-    CHART.write_text(_chart(run, board.timed[0]), encoding="utf-8")
+    CHART.write_text(_chart(combined, board.timed[0]), encoding="utf-8")
     _photograph(run.path / "report.html", folder / "report.png")
     print(f"written: {README}, {PAGE}, {SCORES}, {CHART}; the site is in {folder / 'site'}")  # noqa: T201
     return 0
@@ -126,12 +124,13 @@ def _replace(path: Path, block: str) -> None:
     path.write_text(f"{before}\n{block.strip()}\n\n{behind}", encoding="utf-8")
 
 
-def _chart(run: uwbbench.Run, dataset: str) -> str:
-    """Speed against F1 on a dataset, as the report draws it, as SVG."""
+def _chart(combined: Leaderboard, dataset: str) -> str:
+    """Speed against F1 on a dataset as SVG."""
     import vl_convert
 
-    content = Content(Report(run.folder), [])
-    drawn = pareto(content, next(board for board in content.boards if board[0] == dataset), "f1")
+    content = combined.content
+    section = next(one for one in content.sections if one.dataset == dataset)
+    drawn = pareto(section.main, "f1", section.title, content.labels)
     if drawn is None:
         raise SystemExit(f"no detector was timed on {dataset}: there is no chart to draw")
     svg: str = vl_convert.vegalite_to_svg({**drawn, "width": FIGURE_WIDTH, "config": {**PRINT, "background": "white"}})

@@ -8,10 +8,8 @@ import numpy as np
 import pandas as pd
 
 import uwbbench
-from uwbbench.measure.accuracy.boards import rank_sets
+from uwbbench.tools.leaderboard import Leaderboard
 
-REFERENCE = "reference."
-"""Beginning of the names of stages that are no detectors, but bounds of what can be measured."""
 LIMITS = "limits"
 """Beginning of the names of datasets of test signals."""
 
@@ -54,24 +52,18 @@ class Board:
         return self.figures[self.figures["dataset"] == dataset].set_index("detector")
 
 
-def board_of(run: uwbbench.Run) -> Board:
+def board_of(run: uwbbench.Run, combined: Leaderboard) -> Board:
     """Figures of a run of a suite, from its leaderboard."""
-    combined = uwbbench.leaderboard([run])
-    about = run.manifest["experiment"]
-    references = [
-        one["name"] for one in about["detectors"] if any(s["use"].startswith(REFERENCE) for s in one["pipeline"])
-    ]
-    table, pairs = combined.table, combined.pairs
+    about, table = run.manifest["experiment"], combined.table
+    bounds = set(table.loc[table["bound"], "detector"])
+    references = [one["name"] for one in about["detectors"] if one["name"] in bounds]
     table = table[(table["table"] == "filtering") & table["dataset"].isin(run.manifest["frozen"])]
     parts = []
     for dataset in dict.fromkeys(one["label"] for one in about["datasets"]):
         rows = table[table["dataset"] == dataset].copy()
         if rows.empty:
             continue
-        of_board = pairs[(pairs["dataset"] == dataset) & (pairs["table"] == "filtering") & (pairs["metric"] == "f1")]
-        ranks = _ranks([name for name in rows["detector"] if name not in references], of_board)
-        rows["low"] = [ranks.get(name, (0, 0))[0] for name in rows["detector"]]
-        rows["high"] = [ranks.get(name, (0, 0))[1] for name in rows["detector"]]
+        rows["low"], rows["high"] = (rows[end].fillna(0).astype(int) for end in ("rank", "rank_high"))
         parts.append(rows)
     figures = pd.concat(parts)
     detectors = [one["name"] for one in about["detectors"] if one["name"] not in references]
@@ -84,17 +76,6 @@ def board_of(run: uwbbench.Run) -> Board:
     ]
     machine = run.manifest["sessions"][-1]["machine"]["cpu"]
     return Board(about["name"], about["suite"]["version"], figures, detectors, references, timed, machine)
-
-
-def _ranks(names: list[str], pairs: pd.DataFrame) -> dict[str, tuple[int, int]]:
-    """Rank sets of detectors among themselves, from the comparisons of a board."""
-    place = {name: at for at, name in enumerate(names)}
-    ahead = np.zeros((len(names), len(names)), bool)
-    for pair in pairs[pairs["verdict"] == "differs"].itertuples():
-        if pair.first in place and pair.second in place:
-            better, worse = (pair.first, pair.second) if pair.difference > 0 else (pair.second, pair.first)
-            ahead[place[better], place[worse]] = True
-    return {name: (low, high) for name, (low, high) in zip(names, rank_sets(ahead).tolist(), strict=True)}
 
 
 def readme_text(board: Board) -> str:

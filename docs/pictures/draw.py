@@ -7,6 +7,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import coupling
 from PIL import Image
 
 HERE = Path(__file__).parent
@@ -30,7 +31,8 @@ def main(folder: Path) -> None:
     ):
         subprocess.run([sys.executable, "-m", "uwbbench.cli", *map(str, words)], check=True)  # noqa: S603 - fixed words
     shutil.copyfile(folder / "figures" / "pareto-1-frame-filtering-f1.svg", IMAGES / "speed-against-f1.svg")
-    for name in ("radargram.png", "map.png", "stable-zone.png"):
+    coupling.main(folder / "coupling.png")
+    for name in ("radargram.png", "map.png", "stable-zone.png", "coupling.png"):
         shrink(folder / name, IMAGES / name)
     (IMAGES / "examples").mkdir(exist_ok=True)
     for script in sorted((HERE.parents[1] / "examples").glob("*.py")):

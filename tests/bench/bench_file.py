@@ -13,7 +13,8 @@ from time import perf_counter
 import frames as made
 from harness import Effort, Row, alone, at_most, once, told
 
-from uwbbench.api.capture_file import open_capture, write_capture
+from uwbbench.api.capture_file import open_capture
+from uwbbench.api.capture_writing import write_capture
 from uwbbench.api.frames import BATCH_FRAMES
 from uwbbench.detect.pipeline import load_detector
 

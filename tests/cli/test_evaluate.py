@@ -46,6 +46,27 @@ def test_every_scoring_and_gate_reaches_the_scores(uwbbench, capture: Path, dete
     assert wide["filtering"]["tp"] > narrow["filtering"]["tp"]
 
 
+def test_tracks_of_another_program_are_scored_as_tracks(uwbbench, capture: Path, tmp_path: Path) -> None:
+    opened = package.open_capture(capture)
+    range_m = opened.truth.seen_from(opened.radar, opened.trajectory).range_m[:, 0]
+    rows = "".join(f"{frame},{value + 0.02},7\n" for frame, value in enumerate(range_m))
+    (tmp_path / "mine.csv").write_text(f"frame,range_m,track\n{rows}")
+    words = ("score", capture, "--results", tmp_path / "mine.csv", "--scoring", "track", "--gate-m", 0.5)
+    found = json.loads(uwbbench(*words, "--json").stdout)["filtering"]
+    assert found["track_rmse_m"] == pytest.approx(0.02)
+    assert found["gospa_localisation_m"] <= found["gospa_m"]
+    assert (found["identity_switches"], found["false_tracks_per_minute"]) == (0, 0)
+    shown = uwbbench(*words).stdout
+    assert "GOSPA" in shown
+    assert "after mapping: n/a (the tracks have no positions)" in shown
+
+
+def test_a_detector_without_tracks_is_refused_as_such(uwbbench, capture: Path) -> None:
+    refused = uwbbench("score", capture, "-d", "paper", "--no-latency", "--scoring", "track", code=2)
+    assert "the detections have no column 'track'" in refused.stderr
+    assert "score it by 'frame', 'peak', 'object' or 'latest'" in refused.stderr
+
+
 def test_undefined_numbers_are_null_and_explained(uwbbench, capture: Path) -> None:
     found = json.loads(uwbbench("score", capture, "-d", "null", "--no-latency", "--json").stdout)
     assert found["filtering"]["precision"] is None

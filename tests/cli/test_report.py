@@ -43,7 +43,7 @@ def test_the_suffix_decides_the_format(uwbbench, run: Path, tmp_path: Path) -> N
     assert "\\toprule" in (tmp_path / "a.tex").read_text()
     uwbbench("report", "run", "--format", "csv", "-o", "tables")
     (first, *_) = csv.DictReader((tmp_path / "tables/leaderboard.csv").open())
-    assert first["detector"] == "oracle"
+    assert first["detector"] == "simple"
     assert first["p50_us"] == ""  # not measured
     assert json.loads((tmp_path / "tables/tables.json").read_text())["rows"]["failures"] == 0
 

@@ -111,3 +111,13 @@ def test_a_robot_is_validated_like_the_other_files(uwbbench, tmp_path: Path) -> 
     assert "robot 'rover' on channels 9, fine" in uwbbench("validate", "rover.yaml").stdout
     (tmp_path / "rover.yaml").write_text(text.replace("ringing", "grid"))
     assert "'grid' is no part of a robot" in uwbbench("validate", "rover.yaml", code=2).stderr
+
+
+def test_a_background_is_written_beside_each_receiver_and_shown(uwbbench, scene, tmp_path: Path) -> None:
+    said = uwbbench("simulate", scene.name, "-o", "room.h5", "--background").stdout
+    assert "81 frames of 50 taps, with background, written" in said
+    assert not open_capture(tmp_path / "room.h5").background.truth.objects
+    receiver = json.loads(uwbbench("info", "room.h5", "--json").stdout)["receivers"][0]
+    assert receiver["background"] == {"name": "room/1 background", "frames": 81, "invalid_frames": 0}
+    assert "81 frames" in uwbbench("info", "room.h5").stdout
+    assert "background" not in uwbbench("simulate", scene.name, "-o", "alone.h5").stdout

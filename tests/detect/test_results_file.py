@@ -193,3 +193,26 @@ def test_a_file_of_another_kind_or_none_is_refused(capture, tmp_path):
         read_results(written(tmp_path, "", "mine.txt"), capture)
     with pytest.raises(ScoringError, match="cannot be read: No such file"):
         read_results(tmp_path / "gone.csv", capture)
+
+
+def test_a_track_is_read_and_a_row_without_one_belongs_to_none(capture, tmp_path):
+    text = (
+        "frame,range_m,track,range_rate_m_s,range_sd_m,probability\n0,2.5,3,-0.5,0.04,\n0,1.5,,,,\n1,2.4,3,-0.5,0.04,\n"
+    )
+    read = read_results(written(tmp_path, text), capture).detections
+    assert read["track"].tolist() == [3, -1, 3]
+    assert read["range_rate_m_s"][0] == -0.5
+    assert "probability" not in read
+
+
+@pytest.mark.parametrize(
+    ("row", "said"),
+    [
+        ("1,2.0,0.5", "line 3: track 0.5: expected a whole number"),
+        ("1,2.0,-2", "line 3: track -2: expected a whole number"),
+        ("0,2.0,7", "line 3: track 7 has another row in frame 0 already"),
+    ],
+)
+def test_a_track_is_a_number_in_one_place_at_a_time(row, said, capture, tmp_path):
+    with pytest.raises(ScoringError, match=said):
+        read_results(written(tmp_path, f"frame,range_m,track\n0,2.5,7\n{row}\n"), capture)

@@ -11,23 +11,12 @@ from hypothesis import strategies as st
 from threadpoolctl import threadpool_limits
 
 from tests.fixtures.chance import seed
+from tests.fixtures.shipped import NAMES, ON_A_PLATE
 from uwbbench import load_detector
 from uwbbench.api import Capture, ConfigError, Detections
-from uwbbench.api.locate import shipped
-from uwbbench.api.registry import load_plugin
 from uwbbench.config.source import open_dataset
 from uwbbench.measure.accuracy.scoring import Region, score
 
-NAMES = sorted(shipped("detectors"))
-# Those that need a recording of the empty scene are tested on captures that have one.
-ON_A_PLATE = [
-    name
-    for name in NAMES
-    if not any(
-        "background" in load_plugin("stages", step.use).needs and not step.optional
-        for step in load_detector(name).config.steps
-    )
-]
 FRAMES = 150
 EXPECTED = {
     "paper",

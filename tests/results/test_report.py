@@ -99,7 +99,7 @@ def test_runs_of_one_scene_are_one_piece_of_evidence_and_rank_nobody(run: Run) -
     report = Report(folder)
     assert set(report.leaderboard["scenes"]) == {1}
     assert report.leaderboard["rank_low"].isna().all()
-    assert [row[0]["detector"] for row in report.estimates] == ["oracle", "paper-filtering"]
+    assert [row[0]["detector"] for row in report.estimates] == ["paper-filtering", "oracle"]
 
 
 def test_a_run_folder_without_scenes_has_one_for_each_capture(run: Run) -> None:
@@ -162,7 +162,7 @@ def test_failures_and_captures_without_truth_are_listed_with_their_reasons(
     report = Report(run("[oracle, 'null']", f"[{APPROACH}, {{use: capture, params: {{files: ['b*.h5']}}}}]"))
     by_title = {sheet.title: sheet for sheet in sheets(report)}
     assert len(by_title["Failed"].rows) == 3  # oracle needs the truth that blind.h5 lacks
-    assert {row[0] for row in by_title["Not scored"].rows} == {"null"}
+    assert {row[0] for row in by_title["Not scored"].rows} == {"null (bound)"}
     assert "no ground truth" in by_title["Not scored"].rows[0][-1]
 
 

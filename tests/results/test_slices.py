@@ -54,7 +54,9 @@ ALL_OF_THEM = [
 def made(members: list[Scored]) -> dict[tuple[str, str, str], Any]:
     board = ("s", "simulated", "frame", "filtering")
     known = {(board, "d"): {"recall": estimated(Recall, [one.outcome for one in members])}}
-    found = slices(members, MetricChoice({"rank": "recall", "table": ["recall"]}), range_edges_m(members), SETTINGS, known)
+    found = slices(
+        members, MetricChoice({"rank": "recall", "table": ["recall"]}), range_edges_m(members), SETTINGS, known
+    )
     return {(one.channel, one.material, one.span): one for one in found}
 
 

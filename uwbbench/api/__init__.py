@@ -13,7 +13,8 @@ if TYPE_CHECKING:
     from uwbbench.api.arrays import BoolArray, ComplexArray, FloatArray, IntArray
     from uwbbench.api.block import Block
     from uwbbench.api.capture import Capture, CaptureHeader, Samples, analytic
-    from uwbbench.api.capture_file import list_receivers, open_capture, write_capture
+    from uwbbench.api.capture_file import list_receivers, open_capture
+    from uwbbench.api.capture_writing import write_capture
     from uwbbench.api.case import Evidence, NotApplicable, Violation, cases_of, hard_case
     from uwbbench.api.check import checked
     from uwbbench.api.compiling import compiled, inlined
@@ -63,7 +64,8 @@ _HOME = {
     "arrays": ("BoolArray", "ComplexArray", "FloatArray", "IntArray"),
     "block": ("Block",),
     "capture": ("Capture", "CaptureHeader", "Samples", "analytic"),
-    "capture_file": ("list_receivers", "open_capture", "write_capture"),
+    "capture_file": ("list_receivers", "open_capture"),
+    "capture_writing": ("write_capture",),
     "case": ("Evidence", "NotApplicable", "Violation", "cases_of", "hard_case"),
     "check": ("checked",),
     "compiling": ("compiled", "inlined"),

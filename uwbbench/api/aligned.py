@@ -70,7 +70,7 @@ NO_WINDOW = -1
 
 @dataclass(frozen=True)
 class WindowProfile:
-    """A value for each bin that holds for all frames of a window, such as their mean magnitude.
+    """A value for each bin that holds for the frames of a window, such as their mean magnitude.
 
     Attributes
     ----------

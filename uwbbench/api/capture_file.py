@@ -1,16 +1,15 @@
-"""The capture file, version 1: reading it lazily and writing it whole or not at all.
+"""The capture file, version 1, read lazily.
 
 One HDF5 file holds one run of one radar with one or more receivers. Arrays are contiguous and uncompressed, so that
 they are read where they lie through a memory map; chunked or compressed arrays are read through HDF5. Files with
-objects that move carry version 1.1, which adds a frame axis to ``outline_m``; everything else is version 1.0.
+objects that move carry version 1.1, which adds a frame axis to ``outline_m``; files with a background version 1.2,
+which adds the attribute ``background`` of a receiver; everything else is version 1.0.
 """
 
 from __future__ import annotations
 
-import contextlib
+import dataclasses
 import os
-import uuid
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, cast
 
@@ -28,12 +27,12 @@ FORMAT = "uwbbench-capture"
 _REQUIRED = object()
 _DAMAGE = (OSError, RuntimeError, KeyError, ValueError, TypeError)
 """What h5py and numpy raise where the metadata of a file are damaged."""
-_POSITIVE = ("center_frequency_hz", "bandwidth_hz", "sample_interval_s", "frame_rate_hz")
-_RADAR = ("model", *_POSITIVE, "samples", "channel")
-_RECEIVER_OPTIONAL = ("array_spacing_m", "first_tap_delay_s")
-_TEXTS = ("citation", "description", "recording", "robot")
+POSITIVE = ("center_frequency_hz", "bandwidth_hz", "sample_interval_s", "frame_rate_hz")
+RADAR = ("model", *POSITIVE, "samples", "channel")
+RECEIVER_OPTIONAL = ("array_spacing_m", "first_tap_delay_s")
+TEXTS = ("citation", "description", "recording", "robot")
 """Texts about a capture that need not be there."""
-_TRACKS = ("first_path_index", "first_path_index_sts1", "first_path_index_sts2", "odometry_yaw_rad")
+TRACKS = ("first_path_index", "first_path_index_sts1", "first_path_index_sts2", "odometry_yaw_rad")
 
 
 class _Reader:
@@ -176,7 +175,9 @@ def open_capture(path: str | os.PathLike[str], receiver: str | None = None) -> C
             receiver = receivers[0]
         elif receiver not in receivers:
             raise reader.fail("/receivers", f"no receiver '{receiver}'.{nearest(receiver, receivers)}")
-        return _read(reader, receiver, receivers)
+        capture = _read(reader, receiver, receivers, f"/receivers/{receiver}")
+        background = _background(reader, receiver)
+        return capture if background is None else dataclasses.replace(capture, background=background)
     except CaptureError as error:
         text = str(error)
         raise (error if text.startswith(str(path)) else reader.fail(f"/receivers/{receiver}", text)) from None
@@ -212,8 +213,41 @@ def _receivers(reader: _Reader) -> tuple[str, ...]:
     return receivers
 
 
-def _read(reader: _Reader, receiver: str, receivers: tuple[str, ...]) -> Capture:
-    base = f"/receivers/{receiver}"
+def _background(reader: _Reader, receiver: str) -> Capture | None:
+    """Background that a receiver names: a group of this file, or a capture file in its folder or below."""
+    where = f"/receivers/{receiver}"
+    named = reader.attribute(where, "background", str, None)
+    if named is None:
+        return None
+    if named.startswith("/"):
+        if reader.find(named) is None:
+            raise reader.fail(f"{where}@background", f"names the group '{named}', which is not there")
+        return _read(reader, receiver, (receiver,), named, apart=True)
+    folder = reader.path.parent
+    path = folder / named
+    if Path(named).is_absolute() or not path.resolve().is_relative_to(folder.resolve()):
+        raise reader.fail(f"{where}@background", f"names the file '{named}', which must lie in this file's folder")
+    other = _Reader(path)
+    names = _receivers(other)
+    if receiver not in names:
+        raise other.fail("/receivers", f"no receiver '{receiver}', whose background {reader.path} expects here")
+    return _read(other, receiver, names, f"/receivers/{receiver}")
+
+
+def _read(reader: _Reader, receiver: str, receivers: tuple[str, ...], base: str, *, apart: bool = False) -> Capture:
+    """One recording of a receiver, without its background.
+
+    Parameters
+    ----------
+    reader : _Reader
+    receiver : str
+    receivers : tuple of str
+        All of the file.
+    base : str
+        Group of the recording.
+    apart : bool
+        The group is of another run than the file: it may state name and frame rate, and holds its truth.
+    """
     storage = reader.attribute("/radar", "samples", str)
     if storage not in ("iq", "rf"):
         raise reader.fail("/radar@samples", f"expected 'iq' or 'rf', found '{storage}'")
@@ -230,13 +264,16 @@ def _read(reader: _Reader, receiver: str, receivers: tuple[str, ...]) -> Capture
     assert timestamp_s is not None  # noqa: S101
     if np.any(~np.isfinite(timestamp_s)) or np.any(np.diff(timestamp_s) < 0):
         raise reader.fail(f"{base}/timestamp_s", "expected finite times that do not decrease")
-    tracks: dict[str, Any] = {name: reader.track(f"{base}/{name}", shape[:1]) for name in _TRACKS}
+    tracks: dict[str, Any] = {name: reader.track(f"{base}/{name}", shape[:1]) for name in TRACKS}
     position_m = reader.track(f"{base}/position_m", (shape[0], 3))
     yaw_rad = reader.track(f"{base}/yaw_rad", shape[:1])
-    optional = {name: reader.attribute(base, name, float, None) for name in _RECEIVER_OPTIONAL}
+    optional = {name: reader.attribute(base, name, float, None) for name in RECEIVER_OPTIONAL}
+    rates = {name: reader.positive("/radar", name) for name in POSITIVE}
+    if apart and reader.attribute(base, "frame_rate_hz", float, None) is not None:
+        rates["frame_rate_hz"] = reader.positive(base, "frame_rate_hz")
     radar = Radar(
         model=reader.attribute("/radar", "model", str),
-        **{name: reader.positive("/radar", name) for name in _POSITIVE},
+        **rates,
         taps=shape[1],
         samples="iq" if storage == "iq" else "rf",
         channel=reader.attribute("/radar", "channel", int, None),
@@ -252,18 +289,23 @@ def _read(reader: _Reader, receiver: str, receivers: tuple[str, ...]) -> Capture
     source = reader.attribute("/", "source", str)
     if source not in ("measured", "simulated"):
         raise reader.fail("/@source", f"expected 'measured' or 'simulated', found '{source}'")
+    name = reader.attribute("/", "name", str)
+    texts = {key: reader.attribute("/", key, str, "") for key in TEXTS}
+    if apart:
+        name = reader.attribute(base, "name", str, f"{name} background")
+        texts |= {key: text for key in TEXTS if (text := reader.attribute(base, key, str, None)) is not None}
     return Capture(
-        name=reader.attribute("/", "name", str),
+        name=name,
         source="measured" if source == "measured" else "simulated",
         license=reader.attribute("/", "license", str),
-        **{name: reader.attribute("/", name, str, "") for name in _TEXTS},
+        **texts,
         radar=radar,
         trajectory=Trajectory(
             timestamp_s,
             np.zeros((shape[0], 3)) if position_m is None else position_m,
             np.zeros(shape[0]) if yaw_rad is None else yaw_rad,
         ),
-        truth=_read_truth(reader, shape[0]),
+        truth=_read_truth(reader, f"{base}/truth" if apart else "/truth", shape[0]),
         preamble=preamble,
         sts1=sts[0],
         sts2=sts[1],
@@ -273,13 +315,13 @@ def _read(reader: _Reader, receiver: str, receivers: tuple[str, ...]) -> Capture
     )
 
 
-def _read_truth(reader: _Reader, frames: int) -> Truth | None:
-    if reader.find("/truth") is None:
+def _read_truth(reader: _Reader, base: str, frames: int) -> Truth | None:
+    if reader.find(base) is None:
         return None
     objects = []
-    names = sorted(reader.group("/truth/objects")) if reader.find("/truth/objects") is not None else []
+    names = sorted(reader.group(f"{base}/objects")) if reader.find(f"{base}/objects") is not None else []
     for name in names:
-        where = f"/truth/objects/{name}"
+        where = f"{base}/objects/{name}"
         material = reader.attribute(where, "material", str)
         outline = reader.dataset(f"{where}/outline_m")
         assert outline is not None  # noqa: S101
@@ -291,109 +333,4 @@ def _read_truth(reader: _Reader, frames: int) -> Truth | None:
         if values.ndim == 2 and not np.all(np.isfinite(values)):
             raise reader.fail(f"{where}/outline_m", "expected finite coordinates")
         objects.append(Obstacle(name, material, values, bool(reader.attribute(where, "structure", bool, False))))
-    return Truth(tuple(objects), bool(reader.attribute("/truth", "exhaustive", bool)))
-
-
-def write_capture(path: str | os.PathLike[str], *captures: Capture) -> None:
-    """Write one run, one capture for each receiver, into a capture file.
-
-    The file appears complete or not at all: it is written beside its place and then renamed.
-
-    Parameters
-    ----------
-    path : Path
-        File to write; an existing one is replaced.
-    *captures : Capture
-        Receivers of the same run; their ``radar.receiver`` names differ.
-
-    Raises
-    ------
-    CaptureError
-        If the folder cannot be written to, or the receivers do not belong together.
-    """
-    target = Path(path)
-    names = [capture.radar.receiver for capture in captures]
-    if not captures or len(set(names)) != len(names) or any(not _storable(name) for name in names):
-        raise CaptureError(f"{target}: a capture file needs receivers with distinct names without '/', not {names}")
-    _check_belong_together(target, captures)
-    partial = target.with_name(f".{target.name}-{uuid.uuid4().hex}.part")
-    try:
-        target.parent.mkdir(parents=True, exist_ok=True)
-        with h5py.File(partial, "x") as file:
-            _write(file, captures)
-        partial.replace(target)
-    except (OSError, RuntimeError) as error:  # HDF5 reports a full disk as either
-        raise CaptureError(f"{target}: cannot be written: {error}") from error
-    finally:
-        with contextlib.suppress(OSError):  # a folder that cannot be looked into holds no partial file either
-            partial.unlink(missing_ok=True)
-
-
-def _storable(name: str) -> bool:
-    """Whether a name can stand for a group in the file."""
-    return bool(name) and "/" not in name and name != "."
-
-
-def _check_belong_together(target: Path, captures: Sequence[Capture]) -> None:
-    """Refuse captures that differ in what a file stores once for all its receivers."""
-    first = captures[0]
-    for other in captures[1:]:
-        differing = [name for name in _RADAR if getattr(other.radar, name) != getattr(first.radar, name)]
-        if _stored(first.truth) != _stored(other.truth):
-            differing.append("truth")
-        differing += [name for name in ("recording", "robot") if getattr(other, name) != getattr(first, name)]
-        if differing:
-            names = f"'{first.radar.receiver}' and '{other.radar.receiver}'"
-            raise CaptureError(f"{target}: receivers {names} are not of one run: they differ in {', '.join(differing)}")
-
-
-def _stored(truth: Truth | None) -> list[Any]:
-    """All that a file keeps of a truth, as values that compare."""
-    objects = truth.objects if truth is not None else ()
-    outlines = [np.asarray(obstacle.outline_m, np.float64) for obstacle in objects]
-    labels = [(obstacle.name, obstacle.material, obstacle.structure) for obstacle in objects]
-    return [truth and truth.exhaustive, labels, [(outline.shape, outline.tobytes()) for outline in outlines]]
-
-
-def _write(file: h5py.File, captures: Sequence[Capture]) -> None:
-    first = captures[0]
-    moves = first.truth is not None and any(obstacle.moves for obstacle in first.truth.objects)
-    file.attrs.update({"format": FORMAT, "format_version": "1.1" if moves else "1.0", "name": first.name})
-    file.attrs.update({"source": first.source, "license": first.license})
-    file.attrs.update({name: text for name in _TEXTS if (text := getattr(first, name))})
-    radar = file.create_group("radar")
-    radar.attrs.update({name: value for name in _RADAR if (value := getattr(first.radar, name)) is not None})
-    for capture in captures:
-        _write_receiver(file.create_group(f"receivers/{capture.radar.receiver}"), capture)
-    if first.truth is not None:
-        truth = file.create_group("truth")
-        truth.attrs["exhaustive"] = first.truth.exhaustive
-        truth.create_group("objects")
-        for obstacle in first.truth.objects:
-            if not _storable(obstacle.name):
-                raise CaptureError(f"object name '{obstacle.name}' cannot be stored: it must not be empty or hold '/'")
-            group = truth.create_group(f"objects/{obstacle.name}")
-            group.attrs["material"] = obstacle.material
-            if obstacle.structure:
-                group.attrs["structure"] = True
-            group.create_dataset("outline_m", data=np.asarray(obstacle.outline_m, np.float64))
-
-
-def _write_receiver(group: h5py.Group, capture: Capture) -> None:
-    radar = capture.radar
-    for name in ("mount_position_m", "mount_yaw_rad", "tx_position_m", "noise_taps"):
-        group.attrs[name] = getattr(radar, name)
-    group.attrs.update({name: value for name in _RECEIVER_OPTIONAL if (value := getattr(radar, name)) is not None})
-    present = [name for name in ("preamble", "sts1", "sts2") if getattr(capture, name) is not None]
-    for name in present:
-        samples = getattr(capture, name)
-        kind = np.dtype(np.float32 if radar.samples == "rf" and name == "preamble" else np.complex64)
-        stored = group.create_dataset(name, shape=samples.shape, dtype=kind)
-        for start in range(0, samples.shape[0], 65536):
-            stored[start : start + 65536] = samples[start : start + 65536]
-    for name in ("timestamp_s", "position_m", "yaw_rad"):
-        group.create_dataset(name, data=np.asarray(getattr(capture.trajectory, name), np.float64))
-    for name in (*_TRACKS, "odometry_position_m"):
-        values = getattr(capture, name)
-        if values is not None:
-            group.create_dataset(name, data=np.asarray(values, np.float64))
+    return Truth(tuple(objects), bool(reader.attribute(base, "exhaustive", bool)))

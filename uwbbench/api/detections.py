@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -112,9 +113,9 @@ class Detections:
         Parameters
         ----------
         names : sequence of str
-            Columns behind the frame, none of them of whole numbers.
+            Columns behind the frame.
         table : (n, 1 + columns) array
-            The first column holds the bits of whole numbers, the frames.
+            Whole numbers, such as the frames of the first column, by their bits.
         processed : int and (frames,) bool array
             First frame of the block, and which of its frames were looked at.
         notes : sequence of str
@@ -131,8 +132,8 @@ class Detections:
     def columns(self) -> dict[str, NDArray[Any]]:
         """All columns by name, ``frame`` first."""
         if isinstance(self._columns, tuple):
-            names, table = self._columns
-            self._columns = {"frame": self.frame, **dict(zip(names, table.T[1:], strict=True))}
+            names, _ = self._columns
+            self._columns = {"frame": self.frame, **{name: self[name] for name in names}}
         return self._columns
 
     @property
@@ -194,9 +195,10 @@ class Detections:
     def __getitem__(self, column: str) -> NDArray[Any]:
         """Column by name; NaN throughout where no stage computed it."""
         if isinstance(self._columns, tuple) and column in self._columns[0]:
-            return self._columns[1][:, 1 + self._columns[0].index(column)]
-        values = self.columns.get(column)
-        return np.full(len(self), np.nan) if values is None else values
+            values: NDArray[Any] = self._columns[1][:, 1 + self._columns[0].index(column)]
+            return values.view(np.int64) if column in _INTEGER else values
+        known = self.columns.get(column)
+        return np.full(len(self), np.nan) if known is None else known
 
     @property
     def frame(self) -> IntArray:
@@ -333,11 +335,11 @@ class Detections:
         if not len(self):
             return []
         if isinstance(self._columns, tuple):
-            names, table = self._columns
+            names, table = ("frame", *self._columns[0]), self._columns[1]
             values = table.tolist()
-            for row, frame in zip(values, self.frame.tolist(), strict=True):
-                row[0] = frame
-            names = ("frame", *names)
+            for place in _whole_places(names):
+                for row, whole in zip(values, table.view(np.int64)[:, place].tolist(), strict=True):
+                    row[place] = whole
             return [dict(zip(names, row, strict=True)) for row in values]
         columns = [values.tolist() for values in self._columns.values()]
         return [dict(zip(self._columns, row, strict=True)) for row in zip(*columns, strict=True)]
@@ -352,3 +354,9 @@ class Detections:
         extra = [name for name in self.columns if name not in COLUMNS]
         table = pd.DataFrame({name: self[name] for name in (*COLUMNS, *extra)})
         return table.astype({"cluster": "Int64", "track": "Int64"})
+
+
+@lru_cache(maxsize=64)
+def _whole_places(names: tuple[str, ...]) -> tuple[int, ...]:
+    """Which of some columns hold whole numbers; kept, as a stream asks for it in every frame."""
+    return tuple(place for place, name in enumerate(names) if name in _INTEGER)

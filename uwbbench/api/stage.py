@@ -99,9 +99,25 @@ class Stage(Generic[P]):
         """Ports that this stage looks at; overridden where some of its parameters make it look at more."""
         return self.consumes
 
+    @classmethod
+    def needs_with(cls, params: Params) -> frozenset[str]:  # noqa: ARG003
+        """What the capture must have where the stage has these parameters; overridden where that hangs on them.
+
+        Parameters
+        ----------
+        params : Params
+            Checked parameters of this stage.
+        """
+        return cls.needs
+
     @property
     def every_nth(self) -> bool:
         """Whether the stage looks at every n-th frame alone, so that its answer hangs on which frames were lost."""
+        return False
+
+    @property
+    def whole_windows(self) -> bool:
+        """Whether the stage answers for a window of frames as a whole, so that its answer hangs on all of them."""
         return False
 
     @property
@@ -141,6 +157,8 @@ class Stage(Generic[P]):
 
     def show_background(self, blocks: Iterable[Block]) -> None:
         """Receive what the radar records with nothing in view; called for stages that need a ``background``.
+
+        Whether a stage does may hang on its parameters, as :meth:`needs_with` says.
 
         Parameters
         ----------

@@ -28,7 +28,7 @@ def convert(
 
     The receivers of one run share the file. Several runs get a file each, FILE-NAME.h5; --capture chooses one.
     """
-    from uwbbench.api.capture_file import write_capture
+    from uwbbench.api.capture_writing import write_capture
 
     options.format_of(output, ".h5")
     opened = _open(source, dataset, settings)
@@ -47,6 +47,7 @@ def convert(
         for recorded in captures:
             label = "simulated capture" if recorded.source == "simulated" else "capture"
             size = f"{len(recorded)} frames of {recorded.radar.taps} taps"
+            size += ", with background" if recorded.background is not None else ""
             receiver = f", receiver '{recorded.radar.receiver}'" if len(captures) > 1 else ""
             typer.echo(f"{label} '{recorded.name}'{receiver}, {size}, written to {path}", err=True)
 

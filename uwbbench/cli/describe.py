@@ -119,7 +119,8 @@ def _detector(name: str) -> dict[str, Any]:
     from uwbbench.detect.pipeline import load_detector
 
     config = load_detector(name).config
-    about = {"description": config.description, "citation": config.citation, **config.to_dict()}
+    reported = [one.model_dump() for one in config.reported]
+    about = {"description": config.description, "citation": config.citation, "reported": reported, **config.to_dict()}
     return {"file": str(find_config("detectors", name)), **about}
 
 
@@ -127,7 +128,7 @@ def detector_yaml(facts: dict[str, Any]) -> str:
     """Detector as a YAML file that could be loaded again, its origin in a comment."""
     import yaml
 
-    order = ("schema", "name", "description", "citation", "fidelity")
+    order = ("schema", "name", "description", "citation", "fidelity", "reported")
     head = {key: facts[key] for key in order if facts[key]}
     text = yaml.safe_dump(head, sort_keys=False, allow_unicode=True, width=110) + "pipeline:\n"
     for step in facts["pipeline"]:
@@ -140,7 +141,7 @@ def _without_defaults(step: dict[str, Any]) -> dict[str, Any]:
     kept = {"use": step["use"]}
     if step["as"] != step["use"]:
         kept["as"] = step["as"]
-    return kept | {key: step[key] for key in ("params", "optional") if step[key]}
+    return kept | {key: step[key] for key in ("params", "optional", "unless") if step.get(key)}
 
 
 def capture_file(path: Path) -> dict[str, Any]:
@@ -171,7 +172,10 @@ def capture_file(path: Path) -> dict[str, Any]:
         keys = ("name", "material", "structure", "moves")
         objects = [{key: getattr(obstacle, key) for key in keys} for obstacle in first.truth.objects]
         truth = {"exhaustive": first.truth.exhaustive, "objects": objects}
-    about = {key: getattr(first, key) for key in ("name", "source", "license", "citation", "description")}
+    about = {
+        key: getattr(first, key)
+        for key in ("name", "source", "license", "citation", "description", "recording", "robot")
+    }
     facts = {
         **about,
         "file": str(path),
@@ -182,15 +186,23 @@ def capture_file(path: Path) -> dict[str, Any]:
     return dict(plain(facts))
 
 
+def _invalid(capture: Any) -> int:
+    """Invalid frames; all samples are read."""
+    return sum(int((~frames.valid).sum()) for frames in capture.blocks(4096))
+
+
+def _background(background: Any) -> dict[str, Any]:
+    return {"name": background.name, "frames": len(background), "invalid_frames": _invalid(background)}
+
+
 def _receiver(capture: Any) -> dict[str, Any]:
     radar = capture.radar
-    invalid = sum(int((~frames.valid).sum()) for frames in capture.blocks(4096))
     return {
         "receiver": radar.receiver,
         "frames": len(capture),
         "taps": radar.taps,
         "duration_s": capture.duration_s,
-        "invalid_frames": invalid,
+        "invalid_frames": _invalid(capture),
         "sts": radar.has_sts,
         "first_path": radar.has_first_path,
         "noise_taps": radar.noise_taps,
@@ -200,11 +212,18 @@ def _receiver(capture: Any) -> dict[str, Any]:
         "mount_yaw_rad": radar.mount_yaw_rad,
         "array_spacing_m": radar.array_spacing_m,
         "first_tap_delay_s": radar.first_tap_delay_s,
+        "background": None if capture.background is None else _background(capture.background),
     }
 
 
-def receiver_text(receiver: dict[str, Any]) -> dict[str, str]:
-    """One receiver's row of a table, numbers with units."""
+def receiver_texts(receivers: list[dict[str, Any]]) -> list[dict[str, str]]:
+    """A row of a table for each receiver, numbers with units."""
+    with_background = any(receiver["background"] for receiver in receivers)
+    return [_receiver_text(receiver, with_background) for receiver in receivers]
+
+
+def _receiver_text(receiver: dict[str, Any], with_background: bool) -> dict[str, str]:
+    background = f"{receiver['background']['frames']} frames" if receiver["background"] else "none"
     return {
         "receiver": receiver["receiver"],
         "frames": str(receiver["frames"]),
@@ -215,28 +234,35 @@ def receiver_text(receiver: dict[str, Any]) -> dict[str, str]:
         "first path": "reported" if receiver["first_path"] else "not reported",
         "range window": f"{receiver['window_m']:.2f} m",
         "TX to RX": f"{receiver['baseline_m']:.3f} m",
+        **({"background": background} if with_background else {}),
     }
 
 
 def checked_file(path: Path) -> str:
-    """Summary of a detector, experiment, scene, gate, tuning, fit or robot file that passed all checks.
+    """Summary of a detector, experiment, scene, gate, tuning, training, fit or robot file that passed all checks.
 
     Raises
     ------
     ConfigError, PluginError
-        If it is wrong, or none of the seven.
+        If it is wrong, or none of the eight.
     """
     from uwbbench.config.source import open_dataset
     from uwbbench.detect.pipeline import load_detector
     from uwbbench.run.experiment import read_experiment
     from uwbbench.tools.fit import read_fit
     from uwbbench.tools.gate import read_gate
+    from uwbbench.tools.train import read_training
     from uwbbench.tools.tune import read_tuning
 
     keys = read_yaml(path).data
     if "tuning" in keys:
         tuning = read_tuning(path)
         return f"tuning '{tuning.name}', {len(tuning.tuning)} datasets to tune on, fine"
+    if "training" in keys:
+        training = read_training(path)
+        return (
+            f"training '{training.name}' of {training.step.use}, {len(training.training)} datasets to learn from, fine"
+        )
     if "cells" in keys:
         fit = read_fit(path)
         return f"fit '{fit.name}', {len(fit.start)} parameters, {len(fit.targets)} targets, fine"
@@ -255,12 +281,13 @@ def checked_file(path: Path) -> str:
     if "channels" in keys:
         robot = registry.load_plugin("datasets", registry.default("dataset.scenes")).read_robot(path).model
         return f"robot '{robot.name}' on channels {', '.join(map(str, robot.channels))}, fine"
-    first_keys = ["pipeline", "extends", "detectors", "datasets", "terms", "head", "tuning", "cells", "channels"]
+    first_keys = ["pipeline", "extends", "detectors", "datasets", "terms", "head", "tuning", "training", "cells"]
+    first_keys.append("channels")
     near = [nearest(str(key), first_keys) for key in keys if key != "schema"]
     hint = next((text for text in near if text.startswith(" Did")), "")
     kinds = (
         "a detector ('pipeline' or 'extends'), an experiment ('detectors'), a scene ('terms'), a gate ('head'), a "
-        "tuning ('tuning'), a fit ('cells') nor a robot ('channels')"
+        "tuning ('tuning'), a training ('training'), a fit ('cells') nor a robot ('channels')"
     )
     raise ConfigError(f"{path}: neither {kinds}.{hint}")
 

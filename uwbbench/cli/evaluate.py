@@ -42,6 +42,7 @@ def score(
     import uwbbench
     from uwbbench.measure.accuracy.scoring import ScoringRules
     from uwbbench.run.folder.identity import plain
+    from uwbbench.run.leaks import refuse_trained_on
 
     ScoringRules(scoring.value, gate_m)  # refuses a wrong gate before the detector has run
     if (detector is None) == (results is None):
@@ -53,6 +54,7 @@ def score(
         raise ScoringError(f"{capture}: the capture has no ground truth; it can be detected on, but not scored")
     if detector is not None:
         pipeline = _loaded(detector, settings)
+        refuse_trained_on([pipeline.config], [(opened.name, opened)])
         detections = pipeline.run(
             opened, candidates=scoring is options.Scoring.PEAK, handed_out=scoring is options.Scoring.LATEST
         )

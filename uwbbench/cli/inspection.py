@@ -32,6 +32,7 @@ class File(StrEnum):
     SCENE = "scene"
     GATE = "gate"
     TUNING = "tuning"
+    TRAINING = "training"
     FIT = "fit"
     ROBOT = "robot"
 
@@ -106,13 +107,12 @@ def info(capture: options.CaptureFile, json: options.Json = False) -> None:
         render.print_json(content)
         return
     label = "SIMULATED" if content["source"] == "simulated" else content["source"]
-    about = {key: content[key] for key in ("name", "description", "license", "citation")}
+    about = {key: content[key] for key in ("name", "description", "license", "citation", "recording", "robot")}
+    if about["recording"] == about["name"]:
+        del about["recording"]
     render.print_facts({"capture": about.pop("name"), "source": label, **about, "radar": content["radar"]["text"]})
-    rows = []
-    for receiver in content["receivers"]:
-        facts = describe.receiver_text(receiver)
-        rows.append(list(facts.values()))
-    render.print_table("receivers", list(facts), rows)
+    texts = describe.receiver_texts(content["receivers"])
+    render.print_table("receivers", list(texts[0]), [list(text.values()) for text in texts])
     truth = content["truth"]
     if truth is None:
         typer.echo("no ground truth: detectors can run on it, but it cannot be scored")
@@ -130,7 +130,8 @@ def _object_text(obstacle: dict[str, Any]) -> str:
 
 def validate(
     files: Annotated[
-        list[Path], typer.Argument(metavar="FILE...", help="Detector, experiment, scene, gate, tuning or fit.")
+        list[Path],
+        typer.Argument(metavar="FILE...", help="Detector, experiment, scene, gate, tuning, training, fit."),
     ],
 ) -> None:
     """Check files: detectors, experiments, scenes, fits, gates. Mistakes are named with file, line and key."""
@@ -162,6 +163,7 @@ def schema(
         gate_schema,
         robot_schema,
         scene_schema,
+        training_schema,
         tuning_schema,
     )
 
@@ -171,6 +173,7 @@ def schema(
         File.SCENE: scene_schema,
         File.GATE: gate_schema,
         File.TUNING: tuning_schema,
+        File.TRAINING: training_schema,
         File.FIT: fit_schema,
         File.ROBOT: robot_schema,
     }

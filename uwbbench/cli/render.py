@@ -145,6 +145,7 @@ def print_report(report: Report) -> None:
 
 def print_leaderboard(report: Report) -> None:
     """Print how the detectors did on each dataset, best first, and what did not work."""
+    from uwbbench.results.verdicts import BOUNDS
     from uwbbench.show.text.quantity import Quantity, undefined_titles
     from uwbbench.show.text.report import Tables
     from uwbbench.show.text.wording import set_aside_warning
@@ -157,12 +158,15 @@ def print_leaderboard(report: Report) -> None:
     exhaustive = all(about["exhaustive"] for about, _ in report.estimates)
     groups: dict[tuple[str, tuple[str, ...]], list[list[str]]] = {}
     open_world: set[str] = set()
+    bounded: set[str] = set()
     for about, estimates in report.estimates:
         if about["dataset"] in report.limits.datasets:  # test signals have the tables above, and no leader
             continue
         title = f"{about['dataset']}, {about['source'].upper()}"
         if not about["exhaustive"]:
             open_world.add(title)
+        if about["bound"]:
+            bounded.add(title)
         metrics = report.metrics.of(about["scoring"])
         main = metrics.ranking(exhaustive=exhaustive)  # the one that ranks comes first, and the time beside it
         brief = Quantity.of_all(metrics.brief).items()
@@ -179,6 +183,8 @@ def print_leaderboard(report: Report) -> None:
         print_table(title, columns[shown], [row[shown] for row in rows])
         if any(not math.isnan(about["p50_us"]) for about, _ in report.estimates):
             typer.echo(f"  p50: median time of a frame, {report.timed}, on this machine only")
+        if title in bounded:
+            typer.echo(f"  {BOUNDS}")
         if title in open_world:
             missing = undefined_titles(report.metrics)
             typer.echo(f"  truth not exhaustive: no {missing}; errors are of matches; compare recall with chance")

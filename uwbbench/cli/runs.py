@@ -202,10 +202,12 @@ def rescore(
 
     folder = RunFolder(run)
     before = folder.rules
-    chosen = scoring or [options.Scoring(rules.scoring) for rules in before]
+    chosen = scoring or [options.Scoring(rule.scoring) for rule in before]
     changed = before[0] if gate_m is None else replace(before[0], gate_m=gate_m)
     changed = changed if surface is None else replace(changed, surface=surface.value)
-    score_again(folder, [replace(changed, scoring=one.value) for one in dict.fromkeys(chosen)])
+    where = {} if scoring else {rule.scoring: rule.only for rule in before}
+    rules = [replace(changed, scoring=one.value, only=where.get(one.value)) for one in dict.fromkeys(chosen)]
+    score_again(folder, rules)
     _conclude(folder, None, json=json)
 
 

@@ -17,19 +17,22 @@ def simulate(
     output: Annotated[Path, typer.Option("--output", "-o", metavar="FILE.h5", help="Capture file to write.")],
     settings: options.Settings = None,
     run: Annotated[int, typer.Option(metavar="N", min=1, help="Number of the run; each has its own noise.")] = 1,
+    background: Annotated[
+        bool, typer.Option("--background", help="With a background: the run without its objects, noise drawn anew.")
+    ] = False,
     jobs: Annotated[int, typer.Option(min=1, help="Threads; the result does not depend on it.")] = 1,
     json: options.Json = False,
 ) -> None:
     """Simulate a scene into a capture file."""
     from uwbbench.api import registry
-    from uwbbench.api.capture_file import write_capture
+    from uwbbench.api.capture_writing import write_capture
     from uwbbench.api.locate import find_config
     from uwbbench.api.override import parse_settings
     from uwbbench.config.source import open_dataset
 
     options.format_of(output, ".h5")
     path = find_config("scenes", scene).resolve()
-    params = {"scenes": [str(path)], "set": parse_settings(settings or ()), "runs": run}
+    params = {"scenes": [str(path)], "set": parse_settings(settings or ()), "runs": run, "background": background}
     dataset: Any = open_dataset(registry.default("dataset.scenes"), params, [path.parent])
     names = [name for name in dataset.runs() if name.endswith(f"/{run}")]
     if len(names) > 1:
@@ -46,7 +49,8 @@ def simulate(
         columns = ("term", "kept", "reason", "bound over noise", "pulses", "time")
         render.print_table(f"receiver {receiver}", columns, rows)
     first = simulation.captures[0]
-    typer.echo(f"simulated capture '{names[0]}', {len(first)} frames of {first.radar.taps} taps, written to {output}")
+    size = f"{len(first)} frames of {first.radar.taps} taps{', with background' if background else ''}"
+    typer.echo(f"simulated capture '{names[0]}', {size}, written to {output}")
 
 
 def _facts(term: dict[str, Any]) -> list[str]:

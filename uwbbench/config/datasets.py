@@ -76,6 +76,10 @@ class DatasetSource:
         Parameters that are put over the written ones when a capture is opened, and are stored nowhere.
     region : RegionModel or None
         Where its captures are scored; None for the region of all.
+    scoring : tuple of str
+        How they are scored; empty for all scorings.
+    detectors : tuple of str
+        Names of the detectors that run on them; empty for all.
     """
 
     label: str
@@ -89,6 +93,8 @@ class DatasetSource:
     timed: bool = True
     secret: dict[str, Any] = field(default_factory=dict, repr=False)
     region: RegionModel | None = None
+    scoring: tuple[str, ...] = ()
+    detectors: tuple[str, ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
         """As plain values, without the folders of this machine and without what is secret."""
@@ -97,6 +103,8 @@ class DatasetSource:
         about |= {} if self.at_most is None else {"at_most": self.at_most}
         about |= {"optional": True} if self.optional else {}
         about |= {} if self.timed else {"latency": False}
+        about |= {"scoring": self.scoring} if self.scoring else {}
+        about |= {"detectors": self.detectors} if self.detectors else {}
         return about if self.region is None else {**about, "region": self.region.model_dump()}
 
     def scenes(self, names: Sequence[str]) -> dict[str, str]:

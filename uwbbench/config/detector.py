@@ -18,6 +18,7 @@ from uwbbench.api.locate import find_config
 from uwbbench.api.override import with_values
 from uwbbench.api.yaml_file import YamlFile, parse_yaml, read_yaml
 from uwbbench.config.extends import extended
+from uwbbench.config.reported import ReportedFigures
 from uwbbench.config.weights import anchored_weights, portable_weights
 
 BY_CHANNEL = "by_channel"
@@ -35,6 +36,11 @@ class StepModel(BaseModel):
     optional: bool = Field(
         False, description="Leave the stage out, with a note, where the capture lacks what it needs (such as STS)."
     )
+    unless: str | None = Field(
+        None,
+        description="Name of an optional step before this one, in whose place it stands: left out where that one is "
+        "in use.",
+    )
 
 
 class DetectorModel(BaseModel):
@@ -47,6 +53,9 @@ class DetectorModel(BaseModel):
     description: str = ""
     citation: str = ""
     fidelity: Literal["from-source", "reconstruction", "baseline", "reference"] = "baseline"
+    reported: list[ReportedFigures] = Field(
+        default_factory=list, description="What the source of the method reports of it; no part of the detector."
+    )
     score: str | None = Field(
         None,
         description="Column that orders its candidates in curves without a threshold, larger first; the first of "
@@ -69,6 +78,8 @@ class Step:
         Raw parameters; values may depend on the channel.
     optional : bool
         May be left out where the capture lacks what the stage needs.
+    unless : str
+        Label of the optional step before it in whose place it stands; empty for none.
     place : str
         File, line and key it was read from, for messages.
     implied_by : str
@@ -79,6 +90,7 @@ class Step:
     label: str
     params: dict[str, Any] = field(default_factory=dict)
     optional: bool = False
+    unless: str = ""
     place: str = field(default="", compare=False)
     implied_by: str = field(default="", compare=False)
 
@@ -115,6 +127,8 @@ class DetectorConfig:
     results : Path or None
         Folder in which another program has stored what it found; there are no steps then, and ``fidelity`` says so.
         What is in it counts, not where it is: it is no part of the resolved file.
+    reported : tuple of ReportedFigures
+        What the source of the method reports of it; no part of the resolved file either.
     """
 
     name: str
@@ -124,6 +138,7 @@ class DetectorConfig:
     fidelity: str = "baseline"
     score: str = ""
     results: Path | None = field(default=None, compare=False)
+    reported: tuple[ReportedFigures, ...] = field(default=(), compare=False)
 
     @classmethod
     def of_results(cls, name: str, folder: Path) -> DetectorConfig:
@@ -136,13 +151,20 @@ class DetectorConfig:
 
     def here(self) -> dict[str, Any]:
         """Resolved file as plain values that another process on this machine can read, files that it names included."""
-        steps = [{"use": s.use, "as": s.label, "params": s.params, "optional": s.optional} for s in self.steps]
+        steps = [
+            {"use": s.use, "as": s.label, "params": s.params, "optional": s.optional}
+            | ({"unless": s.unless} if s.unless else {})
+            for s in self.steps
+        ]
         score = {"score": self.score} if self.score else {}
         return {"schema": 1, "name": self.name, "fidelity": self.fidelity, **score, "pipeline": steps}
 
 
 KERNEL = "kernel "
 """What the names of kernels begin with among the names of sources."""
+
+REFERENCE = "reference"
+"""Fidelity of what stands beside detectors for comparison."""
 
 RESULTS_FILE = "results file"
 """Fidelity of a detector that is known by what it has written alone, and how tables mark its rows."""
@@ -156,9 +178,30 @@ def from_results(config: Mapping[str, Any]) -> bool:
     return bool(config.get("fidelity") == RESULTS_FILE)
 
 
-def marked(name: str, *, results_file: bool) -> str:
-    """Name of a detector as tables show it, which say so where its rows are read from a file."""
-    return f"{name} ({RESULTS_FILE})" if results_file else name
+BOUND = "bound"
+"""How tables mark the rows of what is no detector, but bounds what detectors can reach."""
+
+
+def is_bound(config: DetectorConfig) -> bool:
+    """Whether it only bounds what detectors can reach: it or a stage of it is a reference, or reads the truth."""
+    stages = [registry.load_plugin("stages", step.use) for step in config.steps]
+    seeing = any("truth" in stage.needs or stage.fidelity == REFERENCE for stage in stages)
+    return seeing or config.fidelity == REFERENCE
+
+
+def marked(name: str, *, results_file: bool = False, bound: bool = False) -> str:
+    """Name of a detector as tables show it.
+
+    Parameters
+    ----------
+    name : str
+    results_file : bool
+        Whether its rows are read from a file.
+    bound : bool
+        Whether it bounds what detectors can reach, and is none.
+    """
+    marks = [*([RESULTS_FILE] if results_file else []), *([BOUND] if bound else [])]
+    return f"{name} ({', '.join(marks)})" if marks else name
 
 
 def detector_identity(config: Mapping[str, Any], sources: Mapping[str, str]) -> str:
@@ -229,13 +272,29 @@ def check_detector(data: Mapping[str, Any], source: YamlFile) -> DetectorConfig:
                 f"{source.place(('pipeline', index))}: step '{label}' appears twice; name one of them with 'as'"
             )
         params = _with_named_channels(item.params, source, index)
-        step = Step(item.use, label, params, item.optional, source.place(("pipeline", index)))
+        step = Step(item.use, label, params, item.optional, item.unless or "", source.place(("pipeline", index)))
+        _check_unless(step, steps)
         _check_params(step, source, index)
         steps.append(step)
     steps = _completed(steps)
+    for place, figures in enumerate(model.reported):
+        for at, name in enumerate(figures.metrics):
+            if name not in registry.entries("metrics"):
+                where = source.place(("reported", place, "metrics", at))
+                raise ConfigError(f"{where}: no metric '{name}'.{nearest(name, registry.entries('metrics'))}")
     _check_score(model.score, steps, source)
     about = model.description, model.citation, model.fidelity
-    return DetectorConfig(model.name, tuple(steps), *about, model.score or "")
+    return DetectorConfig(model.name, tuple(steps), *about, model.score or "", reported=tuple(model.reported))
+
+
+def _check_unless(step: Step, before: list[Step]) -> None:
+    """Check that a step stands in the place of one that may be left out."""
+    if not step.unless:
+        return
+    optional = [one.label for one in before if one.optional]
+    if step.unless not in optional:
+        known = f"{nearest(step.unless, optional)} There are: {', '.join(optional) or 'none'}"
+        raise ConfigError(f"{step.place}: unless: no optional step '{step.unless}' before '{step.label}'.{known}")
 
 
 def _check_score(score: str | None, steps: list[Step], source: YamlFile) -> None:

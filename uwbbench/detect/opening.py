@@ -61,8 +61,9 @@ def opened(steps: Sequence[Chosen], capture: CaptureHeader, background: Capture 
         stage.open(capture.radar)
         if "truth" in step.stage.needs and capture.truth is not None:
             stage.show_truth(capture.truth, capture.trajectory)
-        if "background" in step.stage.needs and background is not None:
-            stage.show_background(_behind(steps[:place], background, sts="sts" in step.stage.needs))
+        needs = step.stage.needs_with(step.params)
+        if "background" in needs and background is not None:
+            stage.show_background(_behind(steps[:place], background, sts="sts" in needs))
         stages.append(Opened(step.label, stage))
     return stages
 

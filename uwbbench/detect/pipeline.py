@@ -17,7 +17,7 @@ from uwbbench.api.detections import COLUMNS, Detections
 from uwbbench.api.errors import ConfigError, PluginError
 from uwbbench.api.frames import BATCH_FRAMES
 from uwbbench.api.kernel import Kernel
-from uwbbench.api.learning import Trainable
+from uwbbench.api.learning import LearnedParams
 from uwbbench.api.radar import Radar
 from uwbbench.api.stage import Stage
 from uwbbench.api.weights import load_weights
@@ -134,11 +134,15 @@ class Pipeline:
         for step in self._steps(until):
             cls = registry.load_plugin("stages", step.use)
             params, fallen = step.params_for(radar.channel)
+            if step.unless and step.unless in {one.label for one in chosen}:
+                notes.append(f"left out, as '{step.unless}' is in use: {step.label}")
+                continue
             if step.implied_by:
                 notes.append(f"{step.label}: put before '{step.implied_by}', which needs it, with its defaults")
             given = f"channel {radar.channel}" if radar.channel else "a capture without channel"
             notes += [f"{step.label}: no {name} for {given}, used {params[name]}" for name in fallen]
-            lacks = [_NEEDS.get(need, need) for need in sorted(cls.needs - has)]
+            checked = cls.params_type().model_validate(params)
+            lacks = [_NEEDS.get(need, need) for need in sorted(cls.needs_with(checked) - has)]
             lacks += [missing.get(port, port) for port in sorted(cls.consumes - available)]
             lacks = list(dict.fromkeys(lacks))
             if lacks and step.optional:
@@ -149,7 +153,7 @@ class Pipeline:
             if lacks:
                 where = f"detector '{self.name}', step '{step.label}'"
                 raise ConfigError(f"{where}: capture '{capture.name}' has no {', no '.join(lacks)}")
-            chosen.append(Chosen(step.label, cls, cls.params_type().model_validate(params), self._load_weights))
+            chosen.append(Chosen(step.label, cls, checked, self._load_weights))
             available = (available - cls.removes) | cls.produces
         notes += [f"left out, as the capture has no {reason}: {', '.join(names)}" for reason, names in left_out.items()]
         return opened(chosen, capture, background), notes
@@ -160,7 +164,7 @@ class Pipeline:
         return steps if until is None else steps[: [step.label for step in steps].index(until)]
 
     def _load_weights(self, stage: Stage[Any], label: str, radar: Radar) -> None:
-        if not isinstance(stage, Trainable):
+        if not isinstance(stage.params, LearnedParams):  # asked for every stage: a protocol is slow to tell
             return
         try:
             load_weights(stage, radar, self.steps_before(label, radar.channel))

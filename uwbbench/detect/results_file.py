@@ -9,6 +9,8 @@ Conventions
   value are fine. An empty cell and NaN are the same: not known.
 * Rows in another order than that of frames are sorted, those of one frame staying in their order, and a note says so.
   Equal rows are refused: they come from a file that was appended to, and would be counted as false.
+* ``cluster`` and ``track`` are whole numbers; a row without one, or with -1, belongs to none. A track has one row a
+  frame: two are refused.
 * Where ``range_m`` is not known it follows from ``delay_s``, which counts as in the capture (from transmission or from
   the direct path), by the exact geometry, at ``azimuth_rad`` or else straight ahead.
 * ``NAME.frames.csv`` or ``.parquet`` beside ``NAME.csv`` lists the frames that were processed (``frame``) and may say
@@ -96,6 +98,9 @@ def read_results(path: Path, capture: Capture) -> ResultsFile:
     # Empty columns are those that no stage of a detector computed.
     columns = {name: table[name] for name in given if name != "frame" and not np.isnan(table[name]).all()}
     notes = [f"column '{name}' is not read" for name in table.names if name not in COLUMNS]
+    columns |= {name: _numbers(table, name) for name in ("cluster", "track") if name in columns}
+    if "track" in columns:
+        _refuse_split(table, frame, columns["track"])
     columns["range_m"] = _ranges(table, columns, capture.radar, notes)
     valid = np.concatenate([np.empty(0, bool), *(block.valid for block in capture.blocks(BATCH_FRAMES))])
     processed, times_us = np.flatnonzero(valid), None
@@ -124,8 +129,6 @@ def _detections(
     order = order[valid[frame[order]]]
     if len(order) < len(frame):
         notes.append(f"{len(frame) - len(order)} rows left out: a sample of their frame is not finite")
-    if "cluster" in columns:
-        columns["cluster"] = np.nan_to_num(columns["cluster"], nan=-1.0)
     kept: dict[str, Any] = {name: values[order] for name, values in columns.items()}
     return Detections(frame[order], processed=processed, notes=[f"{RESULTS_FILE}: {one}" for one in notes], **kept)
 
@@ -199,6 +202,28 @@ def _frames(table: NumberTable, capture: Capture) -> IntArray:
             f"{frames - 1}.{from_one}"
         )
     return values.astype(np.int64)
+
+
+def _numbers(table: NumberTable, name: str) -> FloatArray:
+    """Column of whole numbers, -1 where there is none."""
+    values = np.nan_to_num(table[name], nan=-1.0)
+    whole = (values == np.floor(values)) & (values >= -1)
+    if not whole.all():
+        row = int(np.argmin(whole))
+        raise ScoringError(
+            f"{table.place(row)}: {name} {values[row]:g}: expected a whole number from 0, or -1 for none"
+        )
+    return values
+
+
+def _refuse_split(table: NumberTable, frame: IntArray, track: FloatArray) -> None:
+    """Refuse a track that is in two places at once."""
+    rows = np.flatnonzero(track >= 0)
+    _, first, which = np.unique(np.stack([frame[rows], track[rows]]), axis=1, return_index=True, return_inverse=True)
+    again = rows[first[which.ravel()] != np.arange(len(rows))]
+    if len(again):
+        row = int(again[0])
+        raise ScoringError(f"{table.place(row)}: track {track[row]:.0f} has another row in frame {frame[row]} already")
 
 
 def _refuse_repeated(table: NumberTable, given: Sequence[str]) -> None:

@@ -21,6 +21,7 @@ from uwbbench.api.arrays import BoolArray, FloatArray, IntArray
 from uwbbench.api.capture import CaptureHeader
 from uwbbench.api.detections import Detections
 from uwbbench.measure.accuracy.metrics.choice import MetricChoice
+from uwbbench.measure.accuracy.rules import rules_on
 from uwbbench.measure.accuracy.scene import Scene
 from uwbbench.measure.accuracy.scoring import ScoringRules
 from uwbbench.measure.accuracy.stats import evaluate
@@ -120,18 +121,18 @@ def cases(
     metrics : MetricChoice
         Of the run.
     """
-    rule = folder.rules[0]
     for (dataset, source), leader in list(leaders.items())[:MOST_DATASETS]:
+        rule = rules_on(folder.rules, dataset)[0]
         chosen = [
             one
             for one in scored
             if (one.dataset, one.source, one.detector) == (dataset, source, leader)
             and (one.scoring, one.table) == (rule.scoring, "filtering")
         ]
-        metrics = metrics.of(rule.scoring)
-        names = [metrics.ranking(exhaustive=one.outcome.exhaustive) for one in chosen]
+        board = metrics.of(rule.scoring)
+        names = [board.ranking(exhaustive=one.outcome.exhaustive) for one in chosen]
         rows = [
-            (name, evaluate(metrics[name], [one.outcome]), one.capture) for name, one in zip(names, chosen, strict=True)
+            (name, evaluate(board[name], [one.outcome]), one.capture) for name, one in zip(names, chosen, strict=True)
         ]
         ranked = [row for row in rows if not math.isnan(row[1])]
         ranked.sort(key=lambda row: (-metrics[row[0]].merit(row[1]), row[2]))
@@ -143,7 +144,7 @@ def cases(
             of_capture = [e for e in entries if (e.dataset, e.capture) == (dataset, capture)]
             about = {"dataset": dataset, "capture": capture, "leader": leader, "which": which}
             about |= {"metric": metric, "scoring": rule.scoring}
-            yield _case(folder, of_capture, rule.of(dataset), score, about)
+            yield _case(folder, of_capture, rule, score, about)
 
 
 def _case(folder: RunFolder, entries: Sequence[Entry], rule: ScoringRules, score: float, about: dict[str, Any]) -> Case:

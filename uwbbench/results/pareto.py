@@ -9,6 +9,7 @@ Conventions
 * The probability of being on the front is the share of draws in which it is. A draw takes values of all detectors from
   their joint t distribution over scenes, and a time ratio for each detector from a log-normal distribution through its
   stored interval, as the run keeps the ratio and its interval only. Below six scenes nothing is drawn.
+* Bounds, such as a detector that reads the truth, are drawn, but are not on the front and put nobody off it.
 * Detectors are compared on the captures that all of them were scored on. One that finds nothing is not drawn.
 """
 
@@ -16,14 +17,14 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from uwbbench.api.arrays import BoolArray, FloatArray
-from uwbbench.api.metric import Metric
+from uwbbench.api.metric import Metric, Outcome
 from uwbbench.measure.accuracy.stats import Estimate, drawn, estimated
 from uwbbench.results.results import Scored, scenes_of
 from uwbbench.results.times import ROWS, comparable, timed_of
@@ -82,7 +83,9 @@ class Point:
     on_front : bool
         By the values themselves.
     probability : float
-        Of being on the front; NaN where there are too few scenes.
+        Of being on the front; NaN where there are too few scenes, and for bounds.
+    bound : bool
+        Whether it is no detector, but bounds what detectors can reach.
     """
 
     detector: str
@@ -90,6 +93,7 @@ class Point:
     error: Estimate
     on_front: bool
     probability: float
+    bound: bool = False
 
 
 def speed_of(timed: Sequence[Entry]) -> Speed | None:
@@ -138,6 +142,7 @@ def points(
     speeds: Mapping[str, Speed],
     metric: type[Metric],
     settings: Mapping[str, Any],
+    bounds: Collection[str] = (),
 ) -> list[Point]:
     """Points of a chart, the fastest first.
 
@@ -149,6 +154,8 @@ def points(
     metric : type of Metric
     settings : mapping
         ``confidence`` and ``seed`` of intervals and draws.
+    bounds : collection of str
+        Names of those that only bound what detectors can reach.
     """
     timed = {name: scored for name, scored in members.items() if name in speeds}
     shared = set.intersection(*(set(_by_capture(scored)) for scored in timed.values())) if timed else set()
@@ -160,23 +167,37 @@ def points(
         estimate = estimated(metric, outcomes, scenes, confidence=settings["confidence"])
         if outcomes and any(outcome.tp.any() for outcome in outcomes) and not math.isnan(estimate.value):
             series[name], estimates[name] = outcomes, estimate
-    if not series:
-        return []
-    names = list(series)
+    rivals = [name for name in series if name not in bounds]
+    best, chance = _on_front(rivals, series, estimates, speeds, metric, scenes, settings["seed"])
+    placed = [
+        Point(name, speeds[name], estimates[name], name in best, chance.get(name, math.nan), name in bounds)
+        for name in series
+    ]
+    return sorted(placed, key=lambda point: point.speed.ratio)
+
+
+def _on_front(
+    names: Sequence[str],
+    series: Mapping[str, Sequence[Outcome]],
+    estimates: Mapping[str, Estimate],
+    speeds: Mapping[str, Speed],
+    metric: type[Metric],
+    scenes: Sequence[str],
+    seed: int,
+) -> tuple[set[str], dict[str, float]]:
+    """Names on the front by the values themselves, and with what probability each is; none where scenes are too few."""
+    if not names:
+        return set(), {}
     logs = np.array([math.log(speeds[name].ratio) for name in names])
-    best = front(logs[None], np.array([[-metric.merit(estimates[name].value) for name in names]]))[0]
-    seed = settings["seed"]
-    errors = -metric.merit(drawn(metric, list(series.values()), scenes, draws=DRAWS, seed=seed))
-    chance = np.full(len(names), math.nan)
+    values = np.array([-metric.merit(estimates[name].value) for name in names])
+    best = front(logs[None], values[None])[0]
+    errors = -metric.merit(drawn(metric, [series[name] for name in names], scenes, draws=DRAWS, seed=seed))
+    chance = dict[str, float]()
     if len(errors):
         spread = np.array([speeds[name].spread for name in names])
         costs = np.random.default_rng([seed, 1]).normal(logs, spread, size=errors.shape)
-        chance = front(costs, errors).mean(axis=0)
-    placed = [
-        Point(name, speeds[name], estimates[name], bool(on), float(p))
-        for name, on, p in zip(names, best, chance, strict=True)
-    ]
-    return sorted(placed, key=lambda point: point.speed.ratio)
+        chance = dict(zip(names, front(costs, errors).mean(axis=0).tolist(), strict=True))
+    return {name for name, on in zip(names, best, strict=True) if on}, chance
 
 
 def front(cost: FloatArray, error: FloatArray) -> BoolArray:

@@ -72,15 +72,13 @@ def known(table: str, channel: int | None, material: str, metric: str) -> float 
     return None
 
 
-def beside(table: pd.DataFrame, detector: str, scoring: str, datasets: Sequence[str]) -> Iterator[dict[str, Any]]:
+def beside(table: pd.DataFrame, datasets: Sequence[str]) -> Iterator[dict[str, Any]]:
     """Every cell of the paper with the figure of a run, and the difference.
 
     Parameters
     ----------
     table : DataFrame
-        Rows by table, scoring, detector, dataset, channel and material, with a column for each metric.
-    detector, scoring : str
-        Whose figures are taken.
+        Rows of one detector and scoring by table, dataset, channel and material, with a column for each metric.
     datasets : sequence of str
         The first of them that has the channel and material is taken.
 
@@ -91,11 +89,10 @@ def beside(table: pd.DataFrame, detector: str, scoring: str, datasets: Sequence[
         (``low``, ``high``), and ``difference`` (here minus published), in metres or shares, NaN where the run has no
         such row; ``dataset``, ``source`` and ``errors`` (detections behind it), empty and 0 there.
     """
-    mine = table[(table["detector"] == detector) & (table["scoring"] == scoring)]
     order = {label: place for place, label in enumerate(datasets)}
     for (kind, channel, material), figures in FIGURES.items():
-        fits = (mine["table"] == kind) & (mine["channel"] == channel) & (mine["material"] == material)
-        rows = sorted(mine[fits].to_dict("records"), key=lambda row: order[row["dataset"]])
+        fits = (table["table"] == kind) & (table["channel"] == channel) & (table["material"] == material)
+        rows = sorted(table[fits].to_dict("records"), key=lambda row: order[row["dataset"]])
         about = {key: rows[0][key] if rows else none for key, none in _NOTHING.items()}
         for metric, value in figures.items():
             here, reach = (

@@ -22,7 +22,8 @@ import numpy as np
 from uwbbench.api.arrays import FloatArray, IntArray
 from uwbbench.measure.accuracy import intervals
 from uwbbench.measure.accuracy.intervals import Interval
-from uwbbench.measure.accuracy.ranked import RankedCounts, pooled
+from uwbbench.measure.accuracy.ranked import RankedCounts, pooled, without_each
+from uwbbench.measure.accuracy.rules import rules_on
 from uwbbench.run.folder.folder import RunFolder
 from uwbbench.run.folder.journal import Entry
 
@@ -101,7 +102,7 @@ def curves_of(folder: RunFolder, units: Sequence[Entry], confidence: float) -> d
     groups: dict[CurveKey, list[tuple[RankedCounts, str]]] = defaultdict(list)
     rules = folder.rules if units else []
     for entry in units:
-        counts = folder.curve(entry.unit, rules[0].of(entry.dataset))
+        counts = folder.curve(entry.unit, rules_on(rules, entry.dataset)[0])
         if counts is not None:
             groups[entry.dataset, entry.facts["source"], entry.detector].append(
                 (counts, folder.scene(entry.dataset, entry.capture))
@@ -125,7 +126,7 @@ def ranked_curve(parts: Sequence[tuple[RankedCounts, Hashable]], confidence: flo
     members = defaultdict[Hashable, list[RankedCounts]](list)
     for part, scene in parts:
         members[scene].append(part)
-    scenes = [pooled(repeats) for repeats in members.values()]
+    scenes = [repeats[0] if len(repeats) == 1 else pooled(repeats) for repeats in members.values()]
     whole = pooled(scenes)
     rows = _thinned(whole)
     score = whole.score[rows]
@@ -133,8 +134,7 @@ def ranked_curve(parts: Sequence[tuple[RankedCounts, Hashable]], confidence: flo
     there, minutes = np.array([part.there for part in scenes]), np.array([part.duration_s / 60 for part in scenes])
     set_tp, set_fp = (np.array([getattr(part, name) for part in scenes]) for name in ("set_tp", "set_fp"))
     about = there, minutes, whole.exhaustive, confidence
-    alone = len(scenes) == 1
-    left = [] if alone else [pooled([*scenes[:at], *scenes[at + 1 :]]).average_precision for at in range(len(scenes))]
+    left = [] if len(scenes) == 1 else without_each(scenes)
     area = intervals.of_left_out(
         whole.average_precision,
         left or [math.nan],

@@ -27,14 +27,16 @@ from uwbbench.api.errors import StoreError
 from uwbbench.config.detector import from_results, marked
 from uwbbench.measure.accuracy.counts import reach_of_mean
 from uwbbench.measure.accuracy.metrics.choice import MetricChoice
-from uwbbench.measure.accuracy.stats import Estimate, evaluate
+from uwbbench.measure.accuracy.scoring import column_of
+from uwbbench.measure.accuracy.stats import Estimate
 from uwbbench.results import published
 from uwbbench.results.chains import chains_of
 from uwbbench.results.error_causes import ErrorCauses, error_causes
 from uwbbench.results.limits import Limits
 from uwbbench.results.pareto import speeds_of_run
 from uwbbench.results.ranked_curves import CurveKey, RankedCurve, curves_of
-from uwbbench.results.results import Scored, errors_in, estimates_of, scenes_of, scored
+from uwbbench.results.reported import reported
+from uwbbench.results.results import Scored, columns_of, errors_in, estimates_of, scenes_of, scored
 from uwbbench.results.set_aside import SetAside, set_aside
 from uwbbench.results.slices import Board
 from uwbbench.results.times import comparable, in_words, row_of, timed_of
@@ -97,6 +99,7 @@ class Report:
         self.entries: list[Entry] = folder.entries()
         self.detectors: list[str] = [config["name"] for config in self.experiment["detectors"]]
         self.read_only: set[str] = {one["name"] for one in self.experiment["detectors"] if from_results(one)}
+        self.bounds = folder.bounds
         self.metrics = MetricChoice(self.experiment["metrics"], [rule.scoring for rule in folder.rules])
         self.settings: dict[str, Any] = {**self.experiment["intervals"], "seed": self.experiment["seed"]}
 
@@ -134,7 +137,9 @@ class Report:
             board[0]: {name: s.ratio for (at, name), s in speeds.items() if at == board[0]} for board in self.boards
         }
         return {
-            board: ranks_of(members, self.metrics.of(board[2]), self._estimates[board], times[board[0]])
+            board: ranks_of(
+                members, self.metrics.of(board[2]), self._estimates[board], times[board[0]], bounds=self.bounds
+            )
             for board, members in self.boards.items()
         }
 
@@ -163,6 +168,7 @@ class Report:
             "exhaustive": all(one.outcome.exhaustive for one in members),
             "chance_recall": float((chance * truths).sum() / truths.sum()) if truths.sum() else math.nan,
             "results_file": first.detector in self.read_only,
+            "bound": first.detector in self.bounds,
             **self._times(first.detector, first.dataset),
         }
 
@@ -181,11 +187,20 @@ class Report:
         return [entry for entry in units if detector in (None, entry.detector)]
 
     def label(self, detector: str, text: str | None = None) -> str:
-        """Name of a detector, or another text for it, as tables show it: marked where its results were read."""
-        return marked(text or detector, results_file=detector in self.read_only)
+        """Name of a detector, or another text for it, as tables show it: marked where it was read, or is a bound."""
+        return marked(text or detector, results_file=detector in self.read_only, bound=detector in self.bounds)
 
     def _of_kind(self, kind: str) -> list[Entry]:
-        return [entry for entry in self.entries if entry.kind == kind and entry.status == "done"]
+        return self._done[kind]
+
+    @cached_property
+    def _done(self) -> Mapping[str, list[Entry]]:
+        """Units that worked, by kind."""
+        done: dict[str, list[Entry]] = defaultdict(list)
+        for entry in self.entries:
+            if entry.status == "done":
+                done[entry.kind].append(entry)
+        return done
 
     @cached_property
     def leaderboard(self) -> pd.DataFrame:
@@ -195,7 +210,7 @@ class Report:
         rows = []
         for about, estimates in self.estimates:
             groups = {estimate.groups for estimate in estimates.values()}
-            rows.append(about | _columns(estimates) | {"groups": max(groups)})
+            rows.append(about | columns_of(estimates) | {"groups": max(groups)})
         return pd.DataFrame(rows)
 
     @cached_property
@@ -228,23 +243,29 @@ class Report:
             order = one.table, one.scoring, self.detectors.index(one.detector), one.dataset, one.channel or 0
             groups[*order, one.material, one.source].append(one)
         rows = []
+        known = {  # a row of all captures of a board has its numbers
+            tuple(map(id, members)): self._estimates[board][name]
+            for board, of_board in self.boards.items()
+            for name, members in of_board.items()
+        }
         for _, members in sorted(groups.items(), key=lambda item: item[0]):
-            first = members[0]
+            first, same = members[0], tuple(map(id, members))
+            estimates = known.get(same) or estimates_of(self.metrics.of(first.scoring), members, self.settings)
             keys = ("table", "scoring", "detector", "dataset", "channel", "material", "source")
             row = {key: getattr(first, key) for key in keys} | {"captures": len(members)}
             row["frames"] = sum(len(one.outcome.group) for one in members)
             row["errors"] = errors_in(one.outcome for one in members)
-            estimates = estimates_of(self.metrics.of(first.scoring), members, self.settings)
-            rows.append(row | _columns(estimates) | self._reach(members))
+            rows.append(row | columns_of(estimates) | self._reach(members))
         return pd.DataFrame(rows)
 
     def _reach(self, members: Sequence[Scored]) -> dict[str, float]:
         """How sure the mean of each of the paper's metrics is over captures that are drawn alike."""
-        known = {name: self.metrics[name] for name in published.METRICS if name in self.metrics}
-        return {
-            f"{name}_reach": reach_of_mean([evaluate(metric, [one.outcome]) for one in members])
-            for name, metric in known.items()
-        }
+        columns = {name: column_of(name, self.metrics[name].unit) for name in published.METRICS if name in self.metrics}
+        reach = {}
+        for name, column in columns.items():
+            stored = [one.numbers.get(column) for one in members]
+            reach[f"{name}_reach"] = reach_of_mean([math.nan if value is None else value for value in stored])
+        return reach
 
     @cached_property
     def repeats_the_paper(self) -> bool:
@@ -259,8 +280,9 @@ class Report:
             return []
         table, datasets = self.paper_tables, [used["label"] for used in self.experiment["datasets"]]
         table = table[table["scoring"] == published.SCORING]
-        detector = next(name for name in self.detectors if name in set(table["detector"]))
-        rows = published.beside(table, detector, published.SCORING, datasets)
+        there = [name for name in self.detectors if name in set(table["detector"])]
+        detector = min(there, key=lambda name: name in self.bounds)
+        rows = published.beside(table[table["detector"] == detector], datasets)
         return [{"detector": detector, "scoring": published.SCORING} | row for row in rows]
 
     @cached_property
@@ -338,9 +360,7 @@ class Report:
 
     def to_dict(self) -> dict[str, Any]:
         """Everything as plain values, for JSON; undefined numbers are NaN, which the store writes as null."""
-        rows = []
-        for about, estimates in self.estimates:
-            rows.append(about | {name: dataclasses.asdict(estimate) for name, estimate in estimates.items()})
+        rows = [about | {name: dataclasses.asdict(e) for name, e in every.items()} for about, every in self.estimates]
         keys = ("kind", "detector", "dataset", "capture", "reason")
         return {
             "run": str(self.folder.path),
@@ -353,6 +373,7 @@ class Report:
             ],
             "paper_tables": self.paper_tables.to_dict("records"),
             "published": self.published,
+            "reported": [one.to_dict() for one in reported(self)],
             "chains": self.chains.to_dict("records"),
             "limits": self.limits.to_dict(),
             "latency": [{**facts_of(e), **e.facts, "timed": timed_of(e.facts)} for e in self._of_kind("latency")],
@@ -363,21 +384,6 @@ class Report:
             "unscored": [{**facts_of(entry), "scoring": s, "reason": reason} for entry, s, reason in self.unscored],
             "notes": self.notes,
         }
-
-
-def _columns(estimates: Mapping[str, Estimate]) -> dict[str, float]:
-    """Values, ends of the intervals and counts of samples, as columns of a table."""
-    columns: dict[str, float] = {}
-    for name, estimate in estimates.items():
-        columns |= {
-            name: estimate.value,
-            f"{name}_low": estimate.low,
-            f"{name}_high": estimate.high,
-            f"{name}_n": estimate.n,
-            f"{name}_outer_low": estimate.outer_low,
-            f"{name}_outer_high": estimate.outer_high,
-        }
-    return columns
 
 
 def _board(about: Mapping[str, Any]) -> Board:

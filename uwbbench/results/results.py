@@ -13,8 +13,10 @@ from uwbbench.api.arrays import FloatArray
 from uwbbench.api.capture import CaptureHeader
 from uwbbench.api.errors import ScoringError, StoreError
 from uwbbench.api.metric import Outcome
+from uwbbench.api.truth import Sight
 from uwbbench.measure.accuracy.judge import judge, tables_of
 from uwbbench.measure.accuracy.metrics.choice import MetricChoice
+from uwbbench.measure.accuracy.rules import rules_on
 from uwbbench.measure.accuracy.scene import Scene
 from uwbbench.measure.accuracy.scoring import ScoringRules, column_of
 from uwbbench.measure.accuracy.stats import Estimate, estimated
@@ -77,6 +79,7 @@ def scored(folder: RunFolder) -> list[Scored]:
 
 def _scored(folder: RunFolder, rows: Mapping[Any, Any], rules: Sequence[ScoringRules]) -> Iterator[Scored]:
     headers: dict[str, CaptureHeader] = {}
+    sights: dict[str, Sight] = {}
     for entry in folder.entries():
         if entry.kind != "accuracy" or entry.status != "done":
             continue
@@ -84,10 +87,11 @@ def _scored(folder: RunFolder, rows: Mapping[Any, Any], rules: Sequence[ScoringR
             headers[entry.capture_id] = folder.header(entry.capture_id)
         detections, header = folder.detections(entry.unit), headers[entry.capture_id]
         try:
-            scene = Scene.of(detections, header)
+            scene = Scene.of(detections, header, sights.get(entry.capture_id))
         except ScoringError:  # its reason is in the stored scores
             continue
-        for rule in (one.of(entry.dataset) for one in rules):
+        sights[entry.capture_id] = scene.sight
+        for rule in rules_on(rules, entry.dataset):
             try:
                 names = tables_of(detections, rule.scoring)
                 tables = {name: judge(detections, scene, rule, name).outcome for name in names}
@@ -144,6 +148,21 @@ def estimates_of(metrics: MetricChoice, members: Sequence[Scored], settings: Map
         if known:
             estimates[name] = Estimate(float(np.mean(known)), math.nan, math.nan, len(known), estimates[name].groups)
     return estimates
+
+
+def columns_of(estimates: Mapping[str, Estimate]) -> dict[str, float]:
+    """Values, ends of the intervals and counts of samples, as columns of a table."""
+    columns: dict[str, float] = {}
+    for name, estimate in estimates.items():
+        columns |= {
+            name: estimate.value,
+            f"{name}_low": estimate.low,
+            f"{name}_high": estimate.high,
+            f"{name}_n": estimate.n,
+            f"{name}_outer_low": estimate.outer_low,
+            f"{name}_outer_high": estimate.outer_high,
+        }
+    return columns
 
 
 def scenes_of(scored: Iterable[Scored]) -> dict[str, str]:

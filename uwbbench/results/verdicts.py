@@ -10,6 +10,7 @@ Conventions
 * A detector has a rank set, such as 1-3: one more than those that are better beyond chance and the margin, up to the
   number of detectors less those that are worse. The top group is all that may be first. One that was not scored on all
   captures of the board has none.
+* Bounds, such as a detector that reads the truth, have no rank, are compared with nobody, and stand last.
 * Detectors stand in the order of their values in the metric that ranks; ties are broken by the headline metric of
   errors (MAE), then by time. *Leads* is said only of the one that alone may be first.
 """
@@ -18,7 +19,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Hashable, Iterable, Mapping, Sequence
+from collections.abc import Collection, Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -49,6 +50,13 @@ INTERVALS = (
     f"1 to {WITHIN_SCENES} scenes one {WITHIN}."
 )
 """What intervals are, for the reader of a table."""
+
+
+BOUNDS = (
+    "bound: no detector, but what detectors are to be read against, as it reads the truth or does not look at all; it "
+    "has no rank and is compared with nobody."
+)
+"""What is said below a table that has one."""
 
 
 @dataclass(frozen=True)
@@ -98,10 +106,12 @@ class Ranks:
     captures, scenes : int
         Captures that any of them was scored on, and scenes that these are of.
     order : tuple of str
-        Keys of the detectors, the best first.
+        Keys of the detectors, the best first, and of the bounds behind them.
     sets : mapping of str to (int, int)
         Smallest and largest rank that each may have; without those that have none.
     pairs : tuple of Pair
+    bounds : frozenset of str
+        Keys of those that only bound what detectors can reach.
     """
 
     main: str
@@ -110,6 +120,7 @@ class Ranks:
     order: tuple[str, ...]
     sets: Mapping[str, tuple[int, int]]
     pairs: tuple[Pair, ...]
+    bounds: frozenset[str] = frozenset()
 
     @property
     def top(self) -> list[str]:
@@ -160,7 +171,7 @@ class Ranks:
         if self.leader == self.order[0]:
             return f"{first} leads with {figures}"
         text = f"{first} comes first with {figures}"
-        if len(self.order) == 1:
+        if len(self.order) - len(self.bounds) <= 1:
             return f"{first} has {figures}"
         if not self.sets:
             return f"{text}, but {counted(self.scenes, 'scene')} cannot rank (six can)"
@@ -201,6 +212,7 @@ def ranks_of(
     estimates: Mapping[str, Mapping[str, Estimate]],
     times: Mapping[str, float],
     compared: Iterable[str] = (),
+    bounds: Collection[str] = (),
 ) -> Ranks:
     """Ranks of the detectors of a board.
 
@@ -215,14 +227,17 @@ def ranks_of(
         Time a frame of those that were timed, by which ties are broken.
     compared : iterable of str
         Metrics in which detectors are compared in pairs, besides the one that ranks.
+    bounds : collection of str
+        Keys of those that only bound what detectors can reach.
     """
     every = [one for scored in members.values() for one in scored]
     exhaustive = all(one.outcome.exhaustive for one in every)
     main = metrics.ranking(exhaustive=exhaustive)
     captures = {one.capture for one in every}
     scenes = scenes_of(every)
-    pairs = pairs_of(members, metrics, dict.fromkeys([main, *compared]), scenes)
-    complete = [key for key, scored in members.items() if len(scored) == len(captures)]
+    ranked = {key: scored for key, scored in members.items() if key not in bounds}
+    pairs = pairs_of(ranked, metrics, dict.fromkeys([main, *compared]), scenes)
+    complete = [key for key, scored in ranked.items() if len(scored) == len(captures)]
     place = {key: at for at, key in enumerate(complete)}
     ahead = np.zeros((len(complete), len(complete)), bool)
     for pair in pairs:
@@ -238,9 +253,10 @@ def ranks_of(
     def order(key: str) -> tuple[float, ...]:
         merits = [metrics[name].merit(estimates[key][name].value) for name in names]
         costs = [math.inf if math.isnan(merit) else -round(merit, 12) for merit in merits]
-        return (key not in place, *costs, times.get(key, math.inf))
+        return (key in bounds, key not in place, *costs, times.get(key, math.inf))
 
-    return Ranks(main, len(captures), count, tuple(sorted(members, key=order)), sets, pairs)
+    known = frozenset(key for key in members if key in bounds)
+    return Ranks(main, len(captures), count, tuple(sorted(members, key=order)), sets, pairs, known)
 
 
 def pairs_of(

@@ -20,10 +20,11 @@ from joblib import Parallel, delayed
 
 from uwbbench.api.errors import StoreError, UwbbenchError
 from uwbbench.api.interruption import by_plugin, listening
-from uwbbench.config.detector import DetectorConfig, detector_identity, read_detector
+from uwbbench.config.detector import DetectorConfig, detector_identity, is_bound, read_detector
 from uwbbench.config.seeds import HIDDEN
 from uwbbench.detect.pipeline import Pipeline
 from uwbbench.detect.results_folder import ResultsFolder
+from uwbbench.measure.accuracy.rules import rules_on
 from uwbbench.measure.accuracy.scoring import ScoringRules
 from uwbbench.measure.latency.machine import machine, usable_cores
 from uwbbench.run import environment
@@ -36,6 +37,7 @@ from uwbbench.run.folder.scored import rules_of, table_of, with_metrics
 from uwbbench.run.hard_cases import examined
 from uwbbench.run.hard_cases import failed as unexamined
 from uwbbench.run.hard_cases import identity_of as identity_of_cases
+from uwbbench.run.leaks import refuse_trained_on
 from uwbbench.run.plan import Plan, Unit, plan, reason_of
 from uwbbench.run.unit import Finished, Job, content_of, entry_of, run_unit
 
@@ -102,6 +104,8 @@ def run_experiment(
 
     Raises
     ------
+    ConfigError
+        If a detector was trained on captures of the experiment.
     StoreError
         If results cannot be written, or the folder holds another experiment.
     Interrupted
@@ -109,6 +113,8 @@ def run_experiment(
     """
     workers = usable_cores() if jobs is None else max(1, jobs)
     todo = plan(experiment)
+    refs = {(unit.dataset, unit.ref.name): unit.ref for unit in todo.units}
+    refuse_trained_on(experiment.runnable, ((f"{label}: {name}", ref) for (label, name), ref in refs.items()))
     made = _resumed if resume else _created
     folder = made(experiment, todo, out, workers)
     try:
@@ -129,14 +135,21 @@ def _created(experiment: Experiment, todo: Plan, out: Path | None, jobs: int) ->
         **_code(experiment, todo),
         "scenes": todo.scenes,
         "skipped": todo.skipped,
+        **_reported(experiment),
         **({} if experiment.frozen is None else {"frozen": experiment.frozen.contents()}),
         "sessions": [environment.session(jobs)],
     }
     return RunFolder.create(out, manifest)
 
 
+def _reported(experiment: Experiment) -> dict[str, Any]:
+    """What sources report of the detectors, where they do."""
+    figures = {one.name: [each.model_dump() for each in one.reported] for one in experiment.detectors if one.reported}
+    return {"reported": figures} if figures else {}
+
+
 def _code(experiment: Experiment, todo: Plan) -> dict[str, Any]:
-    """Identities of the detectors and of the reference of times, and hashes of what their results come from."""
+    """What detectors and the reference of times are: identities, hashes of what they come from, and who is a bound."""
     sources: dict[str, str] = {}
     for config in experiment.detectors:
         if config.results is None:
@@ -150,6 +163,7 @@ def _code(experiment: Experiment, todo: Plan) -> dict[str, Any]:
     return {
         "detectors": {config.name: detector_identity(config.to_dict(), sources) for config in experiment.detectors},
         "sources": sources,
+        "bounds": [config.name for config in experiment.detectors if is_bound(config)],
         "reference": reference,
     }
 
@@ -281,7 +295,7 @@ class _Run:
 
     def _rules(self, dataset: str) -> tuple[ScoringRules, ...]:
         """Rules of the captures of one dataset."""
-        return tuple(rule.of(dataset) for rule in self.rules)
+        return tuple(rules_on(self.rules, dataset))
 
     def _identity(self, unit: Unit, sha256: str) -> str:
         """Identity of a unit on a capture of this content, here and now."""

@@ -2,64 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Any, Literal
 
-from pydantic import Discriminator, Field, Tag, field_validator
+from pydantic import Field, field_validator
 
 from uwbbench.api import registry
 from uwbbench.api.check import checked
-from uwbbench.api.errors import ConfigError
-from uwbbench.api.locate import is_path
+from uwbbench.api.errors import ConfigError, nearest
 from uwbbench.api.override import with_values
 from uwbbench.api.yaml_file import YamlFile
 from uwbbench.config.datasets import DatasetSource, DatasetUse, dataset_sources
 from uwbbench.config.detector import DetectorConfig, read_detector
 from uwbbench.config.extends import extended, placed
 from uwbbench.config.given import Given, read_given
-from uwbbench.config.model import ConfigModel, DetectorName
+from uwbbench.config.model import ConfigModel
 from uwbbench.config.rules import GateRadius, IntervalModel, MetricsUse, RegionModel, Scoring, Strongest, Surface
 from uwbbench.config.seeds import Seeds, read_seeds
 from uwbbench.config.source import data_roots
 from uwbbench.measure.accuracy.metrics.choice import check_applies, load_metric
 from uwbbench.measure.latency.settings import LatencyModel
+from uwbbench.run.combine import combined
+from uwbbench.run.contenders import DetectorItem, read_detectors, with_absolute_paths
 from uwbbench.run.folder.scored import rules_of
 from uwbbench.run.suite import WHOLE, Frozen, SuitePart, read_frozen
-
-
-class DetectorUse(ConfigModel):
-    """A detector with another name or other values."""
-
-    use: DetectorName = Field(description="Name, or path to a detector YAML.")
-    name: str | None = Field(default=None, min_length=1, description="Name in tables and reports.")
-    set: dict[str, Any] = Field(default_factory=dict, description="Values to change in the detector, by path.")
-
-
-class ResultsUse(ConfigModel):
-    """What another program has found, in a folder of results files."""
-
-    results: str = Field(min_length=1, description="Folder with CAPTURE.csv or .parquet for each capture.")
-    name: str | None = Field(default=None, min_length=1, description="Name in tables; the folder's if left out.")
-
-
-def _kind(item: Any) -> str:
-    """Form that an item of ``detectors`` has, so that a mistake is explained by that form alone."""
-    if item is None:
-        return "null"
-    if isinstance(item, dict):
-        return ResultsUse.__name__ if "results" in item else DetectorUse.__name__
-    return type(item).__name__ if isinstance(item, DetectorUse | ResultsUse) else "name"
-
-
-DetectorItem = Annotated[
-    Annotated[str, Tag("name")]
-    | Annotated[None, Tag("null")]
-    | Annotated[DetectorUse, Tag(DetectorUse.__name__)]
-    | Annotated[ResultsUse, Tag(ResultsUse.__name__)],
-    Discriminator(_kind),
-]
 
 
 class ScoredDataset(DatasetUse):
@@ -70,6 +38,12 @@ class ScoredDataset(DatasetUse):
     )
     optional: bool = Field(default=False, description="Skip it, with a note, where its files are not there.")
     latency: bool = Field(default=True, description="Time detectors on it, where the experiment times them at all.")
+    scoring: list[Scoring] | None = Field(
+        default=None, min_length=1, description="How these captures are scored, of the experiment's; all if left out."
+    )
+    detectors: list[str] | None = Field(
+        default=None, min_length=1, description="Names of the detectors that run on it; all if left out."
+    )
 
 
 class QuickModel(ConfigModel):
@@ -87,6 +61,11 @@ class ExperimentModel(ConfigModel):
     name: str | None = Field(default=None, min_length=1, description="Name of the run; the file's name if left out.")
     description: str = ""
     extends: str | None = Field(default=None, description="Experiment (name or file) that this one changes.")
+    experiments: list[str] | None = Field(
+        default=None,
+        description="Experiments (names or files) to run as one, in place of 'detectors' and 'datasets': each dataset "
+        "keeps the detectors, scorings and region of its experiment.",
+    )
     set: dict[str, Any] = Field(default_factory=dict, description="Values to change in the extended one, by path.")
     detectors: list[DetectorItem] = Field(
         min_length=1, description="Names, paths, changed detectors, or folders of results of any program."
@@ -239,7 +218,8 @@ def read_experiment(
         If a file is missing or wrong; the message names file, line and key.
     """
     path, source = read_given("experiments", name)
-    data = extended(source, "experiments", path, _with_absolute_paths)
+    data = extended(source, "experiments", path, with_absolute_paths)
+    data = combined(data, source, path, with_absolute_paths)
     if changes:
         data = with_values(data, changes, "--set")
     model = checked(ExperimentModel, data, source)
@@ -249,10 +229,12 @@ def read_experiment(
     if model.latency.enabled and model.latency.reference is not None:
         with placed(source, ("latency", "reference")):
             read_detector(model.latency.reference, path.parent)
+    detectors = read_detectors(model.detectors, source, path.parent)
+    _check_choices(model, detectors, source)
     experiment = Experiment(
         name=model.name or path.stem,
         description=model.description,
-        detectors=_detectors(model, source, path.parent),
+        detectors=detectors,
         datasets=_datasets(model, source, [str(root) for root in data_roots(data_dir, path)]),
         scoring=tuple(model.scoring),
         gate_m=model.gate_m,
@@ -310,7 +292,29 @@ def _private(experiment: Experiment, seeds: Seeds, source: YamlFile) -> Experime
 def _datasets(model: ExperimentModel, source: YamlFile, roots: list[str]) -> tuple[DatasetSource, ...]:
     sources = dataset_sources(model.datasets, source, roots)
     uses = zip(sources, model.datasets, strict=True)
-    return tuple(replace(one, region=use.region, optional=use.optional, timed=use.latency) for one, use in uses)
+    return tuple(
+        replace(
+            one,
+            region=use.region,
+            optional=use.optional,
+            timed=use.latency,
+            scoring=tuple(use.scoring or ()),
+            detectors=tuple(use.detectors or ()),
+        )
+        for one, use in uses
+    )
+
+
+def _check_choices(model: ExperimentModel, detectors: Iterable[DetectorConfig], source: YamlFile) -> None:
+    """Check that datasets choose among the detectors and scorings of the experiment."""
+    known: dict[str, list[str]] = {"detectors": [one.name for one in detectors], "scoring": list(model.scoring)}
+    for index, dataset in enumerate(model.datasets):
+        for key, names in known.items():
+            for at, name in enumerate(getattr(dataset, key) or ()):
+                if name not in names:
+                    place = source.place(("datasets", index, key, at))
+                    hint = nearest(name, names)
+                    raise ConfigError(f"{place}: '{name}' is not among the experiment's {key}.{hint}")
 
 
 def _metrics(model: ExperimentModel, source: YamlFile) -> tuple[str, ...] | dict[str, Any]:
@@ -331,50 +335,3 @@ def _metrics(model: ExperimentModel, source: YamlFile) -> tuple[str, ...] | dict
     if isinstance(model.metrics, list):
         return tuple(dict.fromkeys(model.metrics))
     return model.metrics.model_dump(exclude_none=True)
-
-
-def _with_absolute_paths(values: dict[str, Any], folder: Path) -> dict[str, Any]:
-    """Values of an extended experiment whose detectors are found from anywhere."""
-    if isinstance(values.get("detectors"), list):
-        values["detectors"] = [_anchored(item, folder) for item in values["detectors"]]
-    return values
-
-
-def _anchored(item: Any, folder: Path) -> Any:
-    """Detector of an extended experiment: its path starts from that experiment's folder."""
-    if isinstance(item, dict) and isinstance(item.get("results"), str):
-        return {**item, "results": str((folder / item["results"]).resolve())}
-    if isinstance(item, dict):
-        return {**item, "use": _anchored(item.get("use"), folder)}
-    here = isinstance(item, str) and is_path(item) and (folder / item).is_file()
-    return str((folder / item).resolve()) if here else item
-
-
-def _detectors(model: ExperimentModel, source: YamlFile, folder: Path) -> tuple[DetectorConfig, ...]:
-    from uwbbench.detect.pipeline import Pipeline
-
-    configs: dict[str, DetectorConfig] = {}
-    for index, item in enumerate(model.detectors):
-        at = ("detectors", index)
-        if isinstance(item, ResultsUse):
-            config = _stored(item, source.place((*at, "results")), folder)
-        else:
-            use = item if isinstance(item, DetectorUse) else DetectorUse(use="null" if item is None else item)
-            with placed(source, at):
-                config = read_detector(use.use, folder, use.set)
-                config = replace(config, name=use.name or config.name)
-                Pipeline(config)  # checks that its steps fit together
-        if config.name in configs:
-            raise ConfigError(
-                f"{source.place(at)}: detector '{config.name}' appears twice; give one of them another 'name'"
-            )
-        configs[config.name] = config
-    return tuple(configs.values())
-
-
-def _stored(use: ResultsUse, place: str, folder: Path) -> DetectorConfig:
-    """Detector of a folder of results, which is seen from the folder of the experiment."""
-    results = folder / use.results
-    if not results.is_dir():
-        raise ConfigError(f"{place}: {results}: no such folder")
-    return DetectorConfig.of_results(use.name or results.resolve().name, results)

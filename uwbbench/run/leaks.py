@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
 from uwbbench.api import registry
@@ -13,6 +13,7 @@ from uwbbench.api.learning import LearnedParams
 from uwbbench.api.recording import leak_key
 from uwbbench.api.weights import LearnedFrom, read_weights
 from uwbbench.config.detector import BY_CHANNEL, DetectorConfig, Step
+from uwbbench.config.source import CaptureRef
 
 
 @dataclass
@@ -74,15 +75,15 @@ def _learned_from(step: Step) -> Iterable[LearnedFrom]:
 
 
 def refuse_trained_on(
-    detectors: Iterable[DetectorConfig], captures: Iterable[tuple[str, Callable[[], Capture]]]
+    detectors: Iterable[DetectorConfig], captures: Iterable[tuple[str, Capture | CaptureRef]]
 ) -> None:
     """Refuse to score detectors on captures that share content, recording or draws with what they were trained on.
 
     Parameters
     ----------
     detectors : iterable of DetectorConfig
-    captures : iterable of (str, callable)
-        Name for people, and what opens the capture; not opened where no detector has learned anything.
+    captures : iterable of (str, Capture or CaptureRef)
+        With a name for people; opened only where a detector has learned anything.
 
     Raises
     ------
@@ -93,9 +94,9 @@ def refuse_trained_on(
     if not learned:
         return
     found: dict[str, list[str]] = {}
-    for name, opened in captures:
+    for name, given in captures:
         try:
-            capture = opened()
+            capture = given.open() if isinstance(given, CaptureRef) else given
         except BaseException as error:
             if not by_plugin(error):
                 raise

@@ -108,10 +108,11 @@ def plan(experiment: Experiment) -> Plan:
         if experiment.frozen is not None and not source.optional:
             names = [ref.name for ref in references]
             experiment.frozen.check_names(source.label, names, all_of_them=not experiment.part.quick)
-        accuracy += [Unit("accuracy", d, source.label, ref) for ref in references for d in experiment.detectors]
+        chosen = [d for d in experiment.detectors if not source.detectors or d.name in source.detectors]
+        accuracy += [Unit("accuracy", d, source.label, ref) for ref in references for d in chosen]
         timed = references if experiment.latency.captures == "all" else references[:1]
         if source.timed:
-            latency += [Unit("latency", d, source.label, ref) for ref in timed for d in experiment.runnable]
+            latency += [Unit("latency", d, source.label, ref) for ref in timed for d in chosen if d.results is None]
     return Plan(tuple(accuracy + (latency if experiment.latency.enabled else [])), tuple(failures), scenes, skipped)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+from uwbbench.measure.accuracy.rules import rules_on
 from uwbbench.measure.accuracy.scene import Scene
 from uwbbench.measure.accuracy.scoring import ScoringRules
 from uwbbench.run.folder.folder import RunFolder
@@ -45,8 +46,8 @@ def _scored_again(folder: RunFolder, entry: Entry, rules: Sequence[ScoringRules]
     These hold under the rules of the run alone; under others they are not known.
     """
     detections, header = folder.detections(entry.unit), folder.header(entry.capture_id)
-    rules = [rule.of(entry.dataset) for rule in rules]
-    of_run = [rule.of(entry.dataset) for rule in rules_of(folder.manifest["experiment"])]
+    rules = rules_on(rules, entry.dataset)
+    of_run = rules_on(rules_of(folder.manifest["experiment"]), entry.dataset)
     rows = score_rows(detections, header, rules)
     if scorable(rows):
         rows = with_causes(rows, detections, Scene.of(detections, header), rules)

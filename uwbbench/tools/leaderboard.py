@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 _BOARD = ("dataset", "source", "scoring", "table")
+_STANDING = ("rank", "rank_high", "detector", "identity", "bound", "captures")
 
 
 class Leaderboard:
@@ -46,24 +47,24 @@ class Leaderboard:
     def table(self) -> pd.DataFrame:
         """One row for each board and detector, best first.
 
-        A board is a suite, dataset, source, scoring and table. ``rank`` is shared by detectors that the captures do
-        not tell apart, and missing where a detector was not scored on all of them. Each metric has its value and the
-        ends of its interval; ``time_ratio`` is relative to the suite's reference detector.
+        A board is a suite, dataset, source, scoring and table. ``rank`` is the smallest that a detector may have and
+        ``rank_high`` the largest, as captures may not tell detectors apart. They are missing where a detector was not
+        scored on all captures, and for a ``bound``, which only says what detectors can reach. Each metric has its value
+        and the ends of its interval; ``time_ratio`` is relative to the suite's reference detector.
         """
         import pandas as pd
 
         rows = []
         for about, board in self._boards():
             for place in board["standings"]:
-                row = {**about, "rank": place["rank"], "detector": place["detector"], "identity": place["identity"]}
-                row |= {"captures": place["captures"], "runs": ", ".join(place["runs"])}
+                row = {**about, **{key: place[key] for key in _STANDING}, "runs": ", ".join(place["runs"])}
                 for name, estimate in place["estimates"].items():
                     row |= {name: estimate["value"], f"{name}_low": estimate["low"], f"{name}_high": estimate["high"]}
                 ratio = place["time_ratio"] or {"reference": "", **dict.fromkeys(("ratio", "low", "high"), math.nan)}
                 row |= {"time_ratio": ratio["ratio"], "reference": ratio["reference"]}
                 row |= {"time_ratio_low": ratio["low"], "time_ratio_high": ratio["high"]}
                 rows.append(row)
-        return pd.DataFrame(rows).astype({"rank": "Int64"}) if rows else pd.DataFrame()
+        return pd.DataFrame(rows).astype({"rank": "Int64", "rank_high": "Int64"}) if rows else pd.DataFrame()
 
     @property
     def pairs(self) -> pd.DataFrame:

@@ -122,10 +122,17 @@ def captures() -> Iterator[Capture]:
     """
     whole = approach(frames=FRAMES)
     for channel, sts, dtype in itertools.product((5, 9), (True, False), (np.complex64, np.complex128)):
-        samples: dict[str, Any] = dict.fromkeys(("sts1", "sts2", "first_path_index_sts1", "first_path_index_sts2"))
-        for name in ("preamble", "sts1", "sts2") if sts else ("preamble",):
-            samples[name] = np.array(getattr(whole, name), dtype)
-        radar = dataclasses.replace(
-            whole.radar, channel=channel, center_frequency_hz=CHANNEL_CENTER_HZ[channel], has_sts=sts
-        )
-        yield dataclasses.replace(whole, name=f"warm-up, channel {channel}", radar=radar, **samples)
+        background = None if whole.background is None else _of_kind(whole.background, channel, dtype, sts=sts)
+        capture = _of_kind(dataclasses.replace(whole, background=None), channel, dtype, sts=sts)
+        yield dataclasses.replace(capture, background=background)
+
+
+def _of_kind(whole: Capture, channel: int, dtype: type[np.complexfloating[Any, Any]], *, sts: bool) -> Capture:
+    """The same capture on a channel, in a precision, with its STS or without."""
+    samples: dict[str, Any] = dict.fromkeys(("sts1", "sts2", "first_path_index_sts1", "first_path_index_sts2"))
+    for name in ("preamble", "sts1", "sts2") if sts else ("preamble",):
+        samples[name] = np.array(getattr(whole, name), dtype)
+    radar = dataclasses.replace(
+        whole.radar, channel=channel, center_frequency_hz=CHANNEL_CENTER_HZ[channel], has_sts=sts
+    )
+    return dataclasses.replace(whole, name=f"warm-up, channel {channel}", radar=radar, **samples)

@@ -12,6 +12,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 
 from uwbbench.api import (
+    SPEED_OF_LIGHT_M_S,
     Capture,
     CaptureError,
     ComplexArray,
@@ -157,7 +158,7 @@ def _one_receiver(
         part.seconds += time.perf_counter() - started
     chosen = choose([(part.name, part.term) for part in parts], view, scene.model.fidelity)
     kept = [part for part, one in zip(parts, chosen, strict=True) if one.kept]
-    responses = _synthesised(kept, view, threads)
+    responses = _stored(_synthesised(kept, view, threads), view.radar)
     several = len(scene.model.receivers) > 1
     contributions = tuple(
         replace(one, seconds=part.seconds, pulses=part.pulses) for part, one in zip(parts, chosen, strict=True)
@@ -213,12 +214,28 @@ def _view(scene: Scene, radar: Radar, trajectory: Trajectory, objects: tuple[Sce
         boresight_rad=boresight_rad,
         objects=objects,
         visibility=np.ones((frames, len(objects))),
-        crest_tap=np.full(frames, scene.model.radar.crest_tap),
+        crest_tap=np.full(frames, _crest_tap(scene, radar)),
         direct_amplitude=radar.wavelength_m / (4 * np.pi * radar.baseline_length_m),
         receive_gain=lambda azimuth_rad: np.full(np.shape(azimuth_rad), gain),
         array_phase=lambda azimuth_rad: slope * np.sin(azimuth_rad),
-        pulse=scene.model.radar.pulse.pulse(),
+        pulse=scene.model.radar.shape(),
     )
+
+
+def _crest_tap(scene: Scene, radar: Radar) -> float:
+    """Tap of the direct path's crest, which lies before the first where a device starts to listen later."""
+    if radar.first_tap_delay_s is None:
+        return scene.model.radar.crest_tap
+    return (radar.baseline_length_m / SPEED_OF_LIGHT_M_S - radar.first_tap_delay_s) / radar.sample_interval_s
+
+
+def _stored(responses: Responses, radar: Radar) -> Responses:
+    """Responses as the device stores them: real RF is the real part at the carrier."""
+    if radar.samples == "iq":
+        return responses
+    carrier = np.exp(2j * np.pi * radar.center_frequency_hz * radar.sample_interval_s * np.arange(radar.taps))
+    preamble: Any = (responses.preamble * carrier).real.astype(np.float32)
+    return Responses(preamble)
 
 
 def _described(scene: Scene, contributions: Mapping[str, Sequence[Contribution]]) -> str:

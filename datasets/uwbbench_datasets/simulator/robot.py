@@ -87,6 +87,8 @@ class Robot:
         ------
         ConfigError
         """
+        if radar.device is not None:
+            raise ConfigError(f"{place}: {self} is the robot of another radar: the scene's has a device of its own")
         mine, interval_ns = self.model.radar, CHIP_S / 2 * 1e9
         if radar.channel not in self.model.channels:
             known = ", ".join(map(str, sorted(self.model.channels)))

@@ -15,7 +15,6 @@ import numpy as np
 from pydantic import ConfigDict, Field, field_validator, model_validator
 
 from uwbbench.api import (
-    CHANNEL_CENTER_HZ,
     ConfigError,
     Params,
     PluginError,
@@ -28,10 +27,10 @@ from uwbbench.api import (
     with_values,
 )
 from uwbbench_datasets.simulator.by_channel import for_channel
-from uwbbench_datasets.simulator.radar import CHIP_S, RadarModel, ReceiverModel
+from uwbbench_datasets.simulator.radar import RadarModel, ReceiverModel
 from uwbbench_datasets.simulator.robot import Robot, read_robot
 from uwbbench_datasets.simulator.shapes import ObjectModel
-from uwbbench_datasets.simulator.trajectory import TrajectoryModel, in_space
+from uwbbench_datasets.simulator.trajectory import TrajectoryModel
 
 _MOST_VARIANTS = 10_000
 
@@ -189,33 +188,12 @@ class Scene:
 
     def radar(self, receiver: str) -> Radar:
         """Radar of one receiver."""
-        shared, mount = self.model.radar, self.model.receivers[receiver]
-        return Radar(
-            model="simulated DW3000",
-            center_frequency_hz=CHANNEL_CENTER_HZ[shared.channel],
-            bandwidth_hz=1 / CHIP_S,
-            sample_interval_s=CHIP_S / 2,
-            frame_rate_hz=shared.frame_rate_hz,
-            taps=shared.taps,
-            channel=shared.channel,
-            receiver=receiver,
-            mount_position_m=_triple(mount.mount_position_m),
-            mount_yaw_rad=float(np.radians(mount.mount_yaw_deg)),
-            tx_position_m=_triple(mount.tx_position_m),
-            noise_taps=shared.noise_taps,
-            array_spacing_m=shared.array_spacing_mm * 1e-3,
-            has_sts=shared.sts,
-        )
+        return self.model.radar.radar(receiver, self.model.receivers[receiver])
 
 
 def _number(seed: int, text: str) -> int:
     """Seed that follows from another one and a name."""
     return int.from_bytes(hashlib.sha256(f"{seed} {text}".encode()).digest()[:16])
-
-
-def _triple(point: list[float]) -> tuple[float, float, float]:
-    x, y, z = in_space(point)
-    return float(x), float(y), float(z)
 
 
 def read_scenes(path: Path, changes: Mapping[str, Any] | None = None) -> list[Scene]:

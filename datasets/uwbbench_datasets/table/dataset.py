@@ -7,7 +7,7 @@ mapping says and ``configs/mappings/template.yaml`` for one to start from.
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any, ClassVar
@@ -81,15 +81,52 @@ class Table(Dataset[TableParams]):
     def _files(self) -> dict[str, Path]:
         wanted = self._mapping.files  # read first: nothing else matters while the mapping is wrong
         if self.params.files:
-            return short_names(find_files(self.params.files, self.roots))
-        if not wanted:
+            paths = find_files(self.params.files, self.roots)
+        elif wanted:
+            paths = self._below("files", wanted)
+        else:
             raise CaptureError(f"{self._mapping_path}: names no files, and neither do the dataset's parameters")
+        backgrounds = self._below("background", self._mapping.background)
+        return short_names([path for path in paths if path not in backgrounds])
+
+    def _below(self, key: str, patterns: list[str]) -> list[Path]:
+        """Files that the mapping names under a key, in its folder or below."""
         folder = self._mapping_path.parent
-        paths = find_files(wanted, [folder])
+        paths = find_files(patterns, [folder])
         outside = [path for path in paths if not path.is_relative_to(folder.resolve())]
         if outside:
-            raise CaptureError(f"{self._mapping_path}: files: {outside[0]} lies outside the mapping's folder")
-        return short_names(paths)
+            raise CaptureError(f"{self._mapping_path}: {key}: {outside[0]} lies outside the mapping's folder")
+        return paths
+
+    @cached_property
+    def _backgrounds(self) -> dict[str, _Part]:
+        """Recordings with nothing in view, by name."""
+        parts: dict[str, _Part] = {}
+        for stem, path in short_names(self._below("background", self._mapping.background)).items():
+            parts |= self._parts(stem, path)
+        return parts
+
+    def _background(self, part: _Part) -> Capture | None:
+        """Background of a capture: the one recording of its receiver on its channel."""
+        if not self._mapping.background:
+            return None
+        fits = [
+            (name, one)
+            for name, one in self._backgrounds.items()
+            if (one.receiver, one.channel) == (part.receiver, part.channel)
+        ]
+        if len(fits) != 1:
+            names = f"several, {', '.join(name for name, _ in fits)}" if fits else "none"
+            of_what = [f"receiver '{part.receiver}'"] if part.receiver else []
+            of_what += [f"channel {part.channel}"] if part.channel else []
+            wanted = f"one recording of {' on '.join(of_what) or 'the receiver'}"
+            raise CaptureError(f"{self._mapping_path}: background: expected {wanted}, found {names}")
+        ((name, found),) = fits
+        try:
+            return self._capture(name, found, background=True)
+        except CaptureError as error:
+            text = str(error)
+            raise (error if text.startswith(str(found.path)) else CaptureError(f"{found.path}: {text}")) from None
 
     def names(self) -> list[str]:
         """One capture for each run, receiver and channel of each file.
@@ -124,10 +161,11 @@ class Table(Dataset[TableParams]):
                 parts = self._parts(stem, path)
                 if name in parts:
                     try:
-                        return self._capture(name, parts[name])
+                        return replace(self._capture(name, parts[name]), background=self._background(parts[name]))
                     except CaptureError as error:
                         text = str(error)
-                        raise (error if text.startswith(str(path)) else CaptureError(f"{path}: {text}")) from None
+                        located = text.startswith((str(path), str(self._mapping_path.parent)))
+                        raise (error if located else CaptureError(f"{path}: {text}")) from None
         raise CaptureError(f"no capture named '{name}'.{nearest(name, self.names())}")
 
     def _parts(self, stem: str, path: Path) -> dict[str, _Part]:
@@ -160,7 +198,7 @@ class Table(Dataset[TableParams]):
             parts[name] = _Part(path, run, receiver, channel, np.array(rows), recording)
         return parts
 
-    def _capture(self, name: str, part: _Part) -> Capture:
+    def _capture(self, name: str, part: _Part, *, background: bool = False) -> Capture:
         mapping = self._mapping
         table = FrameColumns(open_recording(part.path, mapping.delimiter), mapping, part.rows)
         preamble = table.samples(mapping.preamble, "preamble")
@@ -190,7 +228,7 @@ class Table(Dataset[TableParams]):
             name=name,
             radar=radar,
             trajectory=Trajectory(timestamp_s, position_m, yaw_rad),
-            truth=self._truth(part, table),
+            truth=self._truth(part, table, structure_alone=background),
             source=mapping.origin,
             license=mapping.license,
             citation=mapping.citation,
@@ -231,7 +269,7 @@ class Table(Dataset[TableParams]):
             has_first_path=has_first_path,
         )
 
-    def _truth(self, part: _Part, table: FrameColumns) -> Truth | None:
+    def _truth(self, part: _Part, table: FrameColumns, *, structure_alone: bool) -> Truth | None:
         facts, column = self._mapping.truth, self._mapping.material_column
         if facts is None:
             return None
@@ -246,7 +284,8 @@ class Table(Dataset[TableParams]):
                 )
             material = materials[0] if materials else material
         present = [item for item in facts.objects if item.runs is None or part.run in item.runs]
-        return Truth(tuple(item.obstacle(material) for item in present), facts.exhaustive)
+        seen = [item for item in present if item.structure or not structure_alone]
+        return Truth(tuple(item.obstacle(material) for item in seen), facts.exhaustive)
 
 
 def _channel(text: str, path: Path, column: str) -> int:

@@ -228,6 +228,11 @@ class TableMapping(Params):
     pose: PoseColumns | None = None
     odometry: PoseColumns | None = None
     truth: TruthFacts | None = None
+    background: list[str] = Field(
+        default_factory=list,
+        description="Paths or globs, below the mapping's folder, of recordings with the same columns and nothing in "
+        "view: the background of the captures of the same receiver and channel. They are no captures themselves.",
+    )
 
     @field_validator("receivers", mode="before")
     @classmethod
@@ -257,7 +262,11 @@ def read_mapping(path: Path) -> TableMapping:
     """
     source = read_yaml(path)
     mapping = checked(TableMapping, source.data, source)
-    inside = (*mapping.files, *([mapping.truth.objects_file] if mapping.truth and mapping.truth.objects_file else []))
+    inside = (
+        *mapping.files,
+        *mapping.background,
+        *([mapping.truth.objects_file] if mapping.truth and mapping.truth.objects_file else []),
+    )
     for name in inside:
         below(path.parent, name)
     truth = mapping.truth

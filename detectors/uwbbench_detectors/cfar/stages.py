@@ -141,7 +141,7 @@ class Cfar(Stage[P]):
     @property
     def resolves_taps(self) -> float:
         """The guard taps for means of training cells, which a second echo raises; an order statistic passes it by."""
-        return self.params.guard_taps if self.statistic in ("ca", "go") else math.inf
+        return self._guard if self.statistic in ("ca", "go") else math.inf
 
     @property
     def _rank(self) -> float:

@@ -44,7 +44,8 @@ class HeldRows:
         self._released[rows] = True
         table = self._rows[rows]
         columns: dict[str, NDArray[Any]] = dict(zip(self._names, table.T, strict=True))
-        return columns | {"frame": columns["frame"].view(np.int64)}
+        whole: dict[str, Any] = {name: columns[name].view(np.int64) for name in ("frame", "track") if name in columns}
+        return columns | whole
 
     def release_all(self) -> dict[str, Any]:
         """Return columns of all rows that are held, in their order of arrival, and hold none."""

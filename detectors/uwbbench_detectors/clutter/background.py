@@ -7,10 +7,11 @@ distance, which vanishes likewise: while the robot stands, or drives along a wal
 from __future__ import annotations
 
 import math
-from typing import ClassVar, TypeVar
+from collections.abc import Iterable
+from typing import ClassVar, Literal, Self, TypeVar
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from uwbbench.api import Block, ComplexArray, IntArray, Params, Radar, Stage, ports
 
@@ -180,52 +181,85 @@ class ExponentialClutter(ClutterRemoval[ExponentialClutterParams]):
 class TemplateClutterParams(Params):
     """What the template is made of, and how it is fitted."""
 
-    frames: int = Field(100, ge=1, description="First frames, known to hold no obstacle, whose mean is the template.")
+    source: Literal["frames", "background"] = Field(
+        "frames",
+        description="'frames': the first ones of the capture itself. 'background': the capture of the same radar with "
+        "nothing in view, which the capture must bring along.",
+    )
+    frames: int = Field(
+        100, ge=1, description="First frames, known to hold no obstacle, whose mean is the template; with 'frames'."
+    )
     span_ns: float | None = Field(
         3.0, gt=0, description="The gain is fitted this far to both sides of the template's crest; null: on all taps."
     )
+
+    @model_validator(mode="after")
+    def _frames_are_used(self) -> Self:
+        if self.source == "background" and "frames" in self.model_fields_set:
+            raise ValueError("'frames' has no meaning with source 'background', whose mean is over all of its frames")
+        return self
 
 
 class TemplateClutter(ClutterRemoval[TemplateClutterParams]):
     """Frame minus a fixed template with a complex gain of its own.
 
-    The template c is the mean of the first frames; every later frame x loses ``a c`` with the least-squares gain
-    ``a = c^H x / |c|^2`` over the taps around the crest of c, which follows gain and phase of the direct path. The
-    frames that the template is made of come out as zero. Frames whose phase is random must be aligned first, or the
-    template averages out.
+    The template c is the mean of the first frames, or of all frames of a background; every later frame x loses ``a c``
+    with the least-squares gain ``a = c^H x / |c|^2`` over the taps around the crest of c, which follows gain and phase
+    of the direct path. The first frames come out as zero where the template is made of them. Frames whose phase is
+    random must be aligned first, or the template averages out.
+
+    Behind a background an obstacle that stands still stays in sight, as long as radar and structure do not move either.
     """
+
+    @classmethod
+    def needs_with(cls, params: Params) -> frozenset[str]:
+        """A background, where the template is made of one."""
+        return ports("background") if getattr(params, "source", None) == "background" else cls.needs
 
     def open(self, radar: Radar) -> None:
         """Start collecting frames."""
         super().open(radar)
         self._collected: list[ComplexArray] = []
         self._count = 0
+        self._made_of = self.params.frames if self.params.source == "frames" else 0
+
+    def show_background(self, blocks: Iterable[Block]) -> None:
+        """Make the template of the usable frames of a background."""
+        total = np.zeros(self.radar.taps, dtype=np.complex128)
+        for block in blocks:
+            samples = np.ascontiguousarray(block.frames.preamble, dtype=np.complex128)
+            for frame in samples[self.loops.usable_frames(samples, block.frames.valid)]:
+                total += frame  # one by one, so that the sum does not hang on the blocks
+                self._made_of += 1
+        self._count = self._made_of
+        if not self._made_of:
+            self.note("clutter.template: the background has no usable frame, so that nothing is taken away")
+        self._finish(total / max(self._made_of, 1))
 
     def remove(self, samples: ComplexArray, index: IntArray) -> ComplexArray:  # noqa: ARG002
         """Frames minus the fitted template; zeros while it is being made."""
-        missing = self.params.frames - self._count
+        missing = self._made_of - self._count
         if missing > 0:
             self.note(f"clutter.template: the first {self.params.frames} frames make the template and yield nothing")
             self._collected.append(samples[:missing])
             self._count += len(samples[:missing])
-            if self._count == self.params.frames:
-                self._finish()
+            if self._count == self._made_of:
+                self._finish(np.concatenate(self._collected).mean(axis=0))
+                self._collected = []
         cleaned = np.zeros_like(samples)
         later = samples[max(missing, 0) :]
         if len(later):
-            operations = float(self.params.frames + later.shape[1])
+            operations = float(self._made_of + later.shape[1])
             cleaned[-len(later) :] = self.loops.less_template(later, self._template, self._weights, operations)
         return cleaned
 
     def flush(self) -> None:
         """Say so if the capture ended before the template was complete."""
-        if self._count < self.params.frames:
+        if self._count < self._made_of:
             self.note(f"clutter.template: the capture has only {self._count} usable frames of {self.params.frames}")
 
-    def _finish(self) -> None:
+    def _finish(self, template: ComplexArray) -> None:
         """Template with a crest of 1, and the weights that turn a frame into its gain."""
-        template = np.concatenate(self._collected).mean(axis=0)
-        self._collected = []
         height = np.abs(template)
         crest = int(np.argmax(height))
         if height[crest] > 0:

@@ -122,6 +122,13 @@ class SvdClutter(ClutterRemoval[SvdClutterParams]):
             residue[row] = self.loops.less_projection(frame, self._shapes, operations)
         return residue
 
+    def flush(self) -> None:
+        """Say so if the capture ended before the window was full."""
+        if 0 < self._count < len(self._window):
+            self.note(
+                f"clutter.svd: the capture has only {self._count} usable frames for a window of {len(self._window)}"
+            )
+
     def _renew_shapes(self) -> None:
         """Orthonormal shapes (rank, taps) that are clutter, of the window as it is now."""
         if len(self._shapes) == self.params.rank:

@@ -65,7 +65,8 @@ class EntropyParams(Params):
         if pulses is None:
             return int(getattr(self, f"{name}_taps"))
         taps = round(pulses / (radar.bandwidth_hz * radar.sample_interval_s))
-        return max(int(taps), {"merge": 0, "tail": 4}.get(name, 1))
+        least: int = {"merge": 0, "tail": 4}.get(name, 1)
+        return max(int(taps), least)
 
 
 class EntropySegments(Stage[EntropyParams]):

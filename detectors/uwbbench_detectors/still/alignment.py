@@ -7,7 +7,7 @@ from typing import ClassVar, Literal, TypeVar
 import numpy as np
 from pydantic import Field
 
-from uwbbench.api import AlignedProfile, Bins, Block, ConfigError, FloatArray, Params, Radar, Stage, ports
+from uwbbench.api import AlignedProfile, Bins, Block, ComplexArray, ConfigError, FloatArray, Params, Radar, Stage, ports
 from uwbbench_detectors.peaks.interpolation import vertex_shift
 from uwbbench_detectors.still.interpolation import between_taps
 
@@ -17,6 +17,8 @@ FIRST_TAP = -4
 """Where the bins begin, in taps behind the first path: the rise of the direct path is among them."""
 DIRECT_TAPS = (-2, 4)
 """Where the crest of the direct path is looked for, in taps behind the first path, which may be its leading edge."""
+LEAST_CREST = 2.0
+"""Height of a direct path over the mean magnitude of its frame; a frame of noise or of a constant has none."""
 AT_ONCE = 256
 """Frames that are worked on together, so that what is made of them stays in the processor's cache."""
 
@@ -50,13 +52,12 @@ class Alignment(Stage[P]):
         """Share of the bins that the frames of a window must fill."""
         return 0.0
 
-    def magnitude(self, block: Block, first_path: FloatArray) -> FloatArray:
+    def magnitude(self, samples: ComplexArray, first_path: FloatArray) -> FloatArray:
         """Magnitudes (frames, bins), NaN where a frame has no sample.
 
         Parameters
         ----------
-        block : Block
-            Its frames are used.
+        samples : (frames, taps) array
         first_path : (frames,) array
             NaN where it is not known.
         """
@@ -74,18 +75,22 @@ class Alignment(Stage[P]):
 
     def step(self, block: Block) -> Block:
         """Block with aligned magnitudes."""
+        first_path = block.part("first_path")
+        first_path = np.where(np.abs(first_path) < self.radar.taps, first_path, np.nan)
         aligned = np.empty((len(block.frames), self.bins.count))
         for start in range(0, len(aligned), AT_ONCE):
-            part = block.cut(start, start + AT_ONCE)
-            first_path, amplitude = part.part("first_path"), part.frames.amplitude
-            first_path = np.where(np.abs(first_path) < amplitude.shape[1], first_path, np.nan)
-            crest = direct_crest(amplitude, first_path)[:, None]
-            known = crest > 0
-            rows = self.magnitude(part, first_path)
-            with np.errstate(over="ignore"):  # beside a direct path of next to nothing
-                rows = rows / np.where(known, crest, 1.0)
-            aligned[start : start + AT_ONCE] = np.where(known & np.isfinite(rows), rows, np.nan)
+            rows = slice(start, start + AT_ONCE)
+            samples = np.asarray(block.frames.preamble[rows], np.complex128)
+            aligned[rows] = self._over_direct_crest(samples, first_path[rows])
         return block.replace(aligned=AlignedProfile(self.bins, aligned, self.minimum_filled))
+
+    def _over_direct_crest(self, samples: ComplexArray, first_path: FloatArray) -> FloatArray:
+        amplitude = np.abs(samples)  # exact down to the smallest numbers, whose squares vanish
+        crest = direct_crest(amplitude, first_path)[:, None]
+        known = crest > LEAST_CREST * np.mean(amplitude, axis=1, keepdims=True)
+        with np.errstate(over="ignore"):  # beside a direct path of next to nothing
+            magnitude = self.magnitude(samples, first_path) / np.where(known, crest, 1.0)
+        return np.where(known & np.isfinite(magnitude), magnitude, np.nan)
 
 
 def direct_crest(amplitude: FloatArray, first_path: FloatArray) -> FloatArray:
@@ -134,9 +139,9 @@ class IntegerAlignment(Alignment[IntegerAlignmentParams]):
         """One."""
         return 1
 
-    def magnitude(self, block: Block, first_path: FloatArray) -> FloatArray:
+    def magnitude(self, samples: ComplexArray, first_path: FloatArray) -> FloatArray:
         """Magnitudes of whole taps."""
-        amplitude = block.frames.amplitude
+        amplitude = np.abs(samples)
         known = np.isfinite(first_path)
         tap = np.floor(np.where(known, first_path, 0.0)).astype(np.int64)[:, None]
         tap = tap + self.bins.first_tap + np.arange(self.bins.count)
@@ -171,12 +176,9 @@ class FractionalAlignment(Alignment[FractionalAlignmentParams]):
         """Bins a tap."""
         return self.params.upsampling
 
-    def magnitude(self, block: Block, first_path: FloatArray) -> FloatArray:
+    def magnitude(self, samples: ComplexArray, first_path: FloatArray) -> FloatArray:
         """Magnitudes between the taps."""
-        samples = block.frames.preamble
-        scale = np.abs(samples).max(axis=1, initial=0.0)[:, None]  # squares of values below 1e-162 would vanish
-        scale = np.where(scale > 0, scale, 1.0)
-        return np.abs(between_taps(samples / scale, first_path, self.bins, self.params.interpolation)) * scale
+        return np.abs(between_taps(samples, first_path, self.bins, self.params.interpolation))
 
 
 class MergedAlignmentParams(Params):
@@ -212,9 +214,9 @@ class MergedAlignment(Alignment[MergedAlignmentParams]):
         """Share of the bins that the frames of a window must fill."""
         return self.params.minimum_filled
 
-    def magnitude(self, block: Block, first_path: FloatArray) -> FloatArray:
+    def magnitude(self, samples: ComplexArray, first_path: FloatArray) -> FloatArray:
         """Magnitudes of the taps in the bins nearest to them."""
-        amplitude = block.frames.amplitude
+        amplitude = np.abs(samples)
         known = np.isfinite(first_path)
         behind = np.arange(amplitude.shape[1]) - np.where(known, first_path, 0.0)[:, None] - self.bins.first_tap
         nearest = np.floor(behind * self.bins.per_tap + 0.5).astype(np.int64)

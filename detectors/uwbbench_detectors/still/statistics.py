@@ -1,4 +1,12 @@
-"""Mean and standard deviation of aligned magnitudes over windows of frames."""
+"""Mean and standard deviation of aligned magnitudes over windows of frames.
+
+References
+----------
+B. Van Herbruggen, S. Luchie, R. Berkvens, J. Fontaine, E. De Poorter, Impact of CIR processing for UWB radar distance
+estimation with the DW1000 transceiver, IPIN 2023, doi 10.1109/IPIN57070.2023.10332499: which frames are left out, and
+windows of some 5 s, as a public re-implementation and a later paper quote it. That windows follow each other without
+overlap, and what is done about a robot that moves, is chosen here.
+"""
 
 from __future__ import annotations
 
@@ -50,7 +58,7 @@ class StatisticParams(Params):
 
 
 class Statistic(Stage[StatisticParams]):
-    """A statistic of each bin over the frames of a window, which holds for all frames of the window.
+    """A statistic of each bin over the frames of a window, which holds for all frames that it is made of.
 
     A window begins where the one before it ends, and its frames are held back until it is full. They are then taken
     together in two passes, which loses no digits and does not hang on how the frames came. Frames without a direct
@@ -67,6 +75,11 @@ class Statistic(Stage[StatisticParams]):
     fidelity = "reconstruction"
 
     name: ClassVar[str]
+
+    @property
+    def whole_windows(self) -> bool:
+        """Always."""
+        return True
 
     def open(self, radar: Radar) -> None:
         """Start an empty window."""
@@ -118,8 +131,9 @@ class Statistic(Stage[StatisticParams]):
                 refused.append(window)
                 self.note(f"{self.name}: {window}")
                 continue
-            row[start:stop] = len(found)
-            found.append(window)
+            usable, statistic = window
+            row[start:stop][usable] = len(found)
+            found.append(statistic)
             stops.append(block.frames.first + stop)
         shape = (0, aligned.bins.count)
         mean, sd, count = (np.stack(part) for part in zip(*found, strict=True)) if found else (np.empty(shape),) * 3
@@ -131,8 +145,8 @@ class Statistic(Stage[StatisticParams]):
         }
         return block.replace(**self.parts(profiles))
 
-    def _window(self, block: Block) -> tuple[FloatArray, FloatArray, IntArray] | str:
-        """Mean, standard deviation and count (bins,) of one window, or why there is none."""
+    def _window(self, block: Block) -> tuple[BoolArray, tuple[FloatArray, FloatArray, IntArray]] | str:
+        """Frames that one window is made of, with mean, standard deviation and count (bins,); or why there are none."""
         p, aligned, frames = self.params, block.aligned_profile, len(block.frames)
         if frames < LEAST_SHARE * self._length:
             return (
@@ -160,7 +174,8 @@ class Statistic(Stage[StatisticParams]):
                 f"{aligned.minimum_filled:.0%}, as the first paths of its frames have too few different fractions of a "
                 "tap"
             )
-        return _between(mean, filled), _between(sd, count > 1), np.floor(_between(count, filled)).astype(np.int64)
+        counts = np.floor(_between(count, filled)).astype(np.int64)
+        return usable, (_between(mean, filled), _between(sd, count > 1), counts)
 
     def _moves(self, frames: Frames) -> bool:
         """Whether odometry moves one of the two antennas away from where it was at the start of the window."""

@@ -73,9 +73,7 @@ def about(approach, **changes: Any) -> About:
         "before": (),
         "source": "",
         "radars": (sampling_of(approach.radar),),
-        "captures": (
-            LearnedFrom(role="training", dataset="d", capture="c", sha256="0" * 64, recording="c"),
-        ),
+        "captures": (LearnedFrom(role="training", dataset="d", capture="c", sha256="0" * 64, recording="c"),),
         "seed": 0,
         "versions": {},
     }

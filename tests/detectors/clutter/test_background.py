@@ -246,3 +246,49 @@ def test_seconds_become_frames_at_the_rate_of_the_radar(
         for params in (seconds, frames)
     )
     np.testing.assert_allclose(one, other, atol=1e-14)
+
+
+def background(make_stage, make_radar, make_block, samples, cut=None):
+    """A stage that was shown a background, whole or in two blocks."""
+    stage = make_stage("clutter.template", source="background")
+    stage.open(make_radar())
+    block = make_block(samples)
+    stage.show_background(iter([block] if cut is None else [block.cut(0, cut), block.cut(cut, len(samples))]))
+    return stage
+
+
+def test_template_of_a_background_cleans_from_the_first_frame_and_keeps_what_stands_still(
+    make_radar, make_block, make_stage
+):
+    tap = np.arange(50)
+    direct, obstacle = np.exp(-((tap - 7.0) ** 2) / 3), 0.1 * np.exp(-((tap - 30.0) ** 2) / 3)
+    stage = background(make_stage, make_radar, make_block, np.tile(direct, (20, 1)))
+    cleaned = stage.step(make_block(np.tile(2j * direct + obstacle, (5, 1)))).frames.preamble
+    np.testing.assert_allclose(cleaned, np.tile(obstacle, (5, 1)), atol=1e-9)
+    assert stage.notes == []
+
+
+def test_background_gives_the_same_bits_however_it_is_cut(make_radar, make_block, make_stage, make_echoes):
+    samples, frames = make_echoes(FRAMES), make_block(make_echoes(30, seed=2))
+    stages = [background(make_stage, make_radar, make_block, samples, cut) for cut in (None, 1, 33)]
+    one, *others = [stage.step(frames).frames.preamble for stage in stages]
+    for other in others:
+        np.testing.assert_array_equal(one, other)
+
+
+def test_a_background_without_a_usable_frame_takes_nothing_away_and_is_noted(make_radar, make_block, make_stage):
+    stage = background(make_stage, make_radar, make_block, np.full((4, 50), np.nan))
+    samples = np.tile(_one_frame(), (3, 1))
+    np.testing.assert_array_equal(stage.step(make_block(samples)).frames.preamble, samples)
+    assert stage.notes == ["clutter.template: the background has no usable frame, so that nothing is taken away"]
+
+
+def test_only_a_template_of_a_background_needs_one(make_stage):
+    for source, needs in (("frames", set()), ("background", {"background"})):
+        stage = make_stage("clutter.template", source=source)
+        assert stage.needs_with(stage.params) == needs
+
+
+def test_frames_of_a_template_that_is_made_of_a_background_are_refused(make_stage):
+    with pytest.raises(ValueError, match="'frames' has no meaning"):
+        make_stage("clutter.template", source="background", frames=20)

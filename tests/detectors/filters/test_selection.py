@@ -51,3 +51,28 @@ def test_a_detection_without_an_amplitude_is_not_the_strongest(make_radar, make_
 @given(rows=ROWS)
 def test_all_retains_every_detection(make_radar, make_block, make_stage, run_stage, rows):
     assert select(make_radar, make_block, make_stage, run_stage, "select.all", rows) == rows
+
+
+@given(rows=ROWS, fraction=st.sampled_from([0.05, 0.3, 1.0]))
+def test_first_above_retains_the_nearest_with_enough_of_the_largest_energy(
+    make_radar, make_block, make_stage, run_stage, rows, fraction
+):
+    expected = []
+    for row in rows:
+        own = [other for other in rows if other[0] == row[0]]
+        strong = [other for other in own if other[2] ** 2 >= fraction * max(one[2] for one in own) ** 2 * (1 - 1e-12)]
+        expected += [row] if row == min(strong, key=lambda one: one[1]) else []
+    assert (
+        select(make_radar, make_block, make_stage, run_stage, "select.first_above", rows, fraction=fraction) == expected
+    )
+
+
+def test_first_above_passes_over_what_has_no_amplitude(make_radar, make_block, make_stage, run_stage):
+    rows = [(0, 2, np.nan), (0, 5, 1.0), (1, 3, np.nan)]
+    assert select(make_radar, make_block, make_stage, run_stage, "select.first_above", rows) == [(0, 5, 1.0)]
+
+
+def test_first_above_says_where_next_to_nothing_was_found(make_radar, make_block, make_stage, run_stage):
+    stage = make_stage("select.first_above")
+    run_stage(stage, make_radar(10), make_block(np.ones((30, 10)), detections=Detections([4], tap=[3], amplitude=[1])))
+    assert stage.notes[0].startswith("select.first_above: detections in only 1 of 30 frames")

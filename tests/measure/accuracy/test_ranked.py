@@ -13,7 +13,7 @@ from tests.measure.accuracy.test_scoring import capture_of, found_in, post
 from uwbbench import load_detector
 from uwbbench.api import Detections
 from uwbbench.measure.accuracy.judge import judge
-from uwbbench.measure.accuracy.ranked import order_of, pooled, ranked
+from uwbbench.measure.accuracy.ranked import order_of, pooled, ranked, without_each
 from uwbbench.measure.accuracy.rules import ScoringRules
 from uwbbench.measure.accuracy.scene import Scene
 
@@ -88,6 +88,14 @@ def test_pooled_counts_are_those_of_all_captures_at_every_threshold():
     assert (both.tp.tolist(), both.fp.tolist()) == ([0, 1, 1], [1, 0, 1])
     assert both.there == 2 * FRAMES
     assert both.duration_s == sum(part.duration_s for part in parts)
+
+
+@pytest.mark.parametrize("exhaustive", [[True, True, True], [True, False, True], [False, True, True]])
+def test_the_average_precision_without_each_capture_is_that_of_the_others_pooled(exhaustive):
+    rows = [[(0, 2.0, 5.0), (1, 3.0, 4.0)], [(0, 2.0, 4.0), (1, 3.0, 9.0)], [(0, 3.0, 4.5), (1, 2.0, np.nan)]]
+    parts = [ranked_of(part, post(2), exhaustive=known)[0] for part, known in zip(rows, exhaustive, strict=True)]
+    others = [pooled([one for one in parts if one is not part]).average_precision for part in parts]
+    assert without_each(parts) == pytest.approx(others, nan_ok=True)
 
 
 def test_precision_is_undefined_where_the_truth_is_not_exhaustive():

@@ -5,6 +5,7 @@ import dataclasses
 import hashlib
 import json
 import re
+import zlib
 from pathlib import Path
 
 import altair
@@ -54,8 +55,9 @@ def test_embedded_data_cannot_end_its_element() -> None:
 def test_the_data_are_whole_and_plain(html: str, content: Content) -> None:
     found = re.search(r'id="data">(.*?)</script>', html, re.DOTALL)
     assert found is not None
-    data = json.loads(found[1], parse_constant=pytest.fail)
-    assert data["detectors"] == ["paper", "cfar-os", "null"]
+    data = json.loads(zlib.decompress(base64.b64decode(found[1])), parse_constant=pytest.fail)
+    assert data["detectors"] == ["paper", "cfar-os", "null (bound)"]
+    assert data["bounds"] == [False, False, True]
     board = content.report.leaderboard
     wholes = [row for row in data["rows"] if row[1:4] == ["", "", ""]]
     assert len(wholes) == len(board)
@@ -126,7 +128,7 @@ def test_without_captures_at_hand_their_truth_and_detections_are_shown(small_run
     looks = Content(Report(small_run)).looks
     assert [look["missing"] for look in looks] == ["Captures were not looked for."] * 2
     for look in looks:
-        assert not any("url" in layer["mark"] for layer in look["radargram"]["layer"])
+        assert not any("url" in layer.get("mark", ()) for layer in look["radargram"]["layer"])
         assert any(layer["data"]["values"] for layer in look["radargram"]["layer"])
 
 

@@ -109,6 +109,19 @@ def test_a_detector_that_needs_sts_says_so(broken_detector):
     assert "STS" in result.detail
 
 
+def test_a_detector_that_needs_a_background_is_given_one_and_says_so_where_there_is_none(broken_detector):
+    line = 'return block.detections["tap"] > self.level'
+    made = broken_detector(
+        f"{line}\n\n    needs = ports('background')\n\n    def show_background(self, blocks):\n"
+        "        for block in blocks:\n            self.level = 0.0",
+        GOOD,
+    )
+    results = examine(made, ["stream-equals-batch", "captures-without-background-are-fine"]).results
+    assert [one.status for one in results] == ["passed", "passed"]
+    assert "refused: " in results[1].detail
+    assert "has no background" in results[1].detail
+
+
 def test_a_name_that_differs_from_the_registered_one_is_told(install_plugin):
     files = {"mine/__init__.py": "", "mine/other.yaml": GOOD.replace("  - {use: broken}\n", "")}
     install_plugin("mine", {"detectors": {"other": "mine:other.yaml"}}, files)

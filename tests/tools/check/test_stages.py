@@ -83,6 +83,19 @@ def swapped(old: str, new: str, source: str = GOOD) -> str:
     return source.replace(old, new)
 
 
+SHOWN = swapped(
+    'produces = ports("profile")\n',
+    """produces = ports("profile")
+    needs = ports("background")
+
+    def show_background(self, blocks):
+        \"\"\"Remember the strongest sample.\"\"\"
+        self.level = 0.0
+        for block in blocks:
+            self.level = max(self.level, block.frames.amplitude.max(initial=0.0))
+""",
+    stage("return block.replace(profile=block.frames.amplitude - self.level)"),
+)
 PROFILE = "return block.replace(profile=block.frames.amplitude)"
 BROKEN = {
     "docstring-says-what-it-is": (swapped('"""Amplitudes times a gain, as a profile."""', "pass"), "no docstring"),
@@ -155,6 +168,10 @@ BROKEN = {
             ),
         ),
         "against",
+    ),
+    "background-may-come-in-blocks": (
+        swapped("max(self.level, block.frames.amplitude.max(initial=0.0))", "block.frames.amplitude.sum()", SHOWN),
+        "profile: ",
     ),
     "instances-share-nothing": (
         stage(
@@ -273,7 +290,7 @@ def test_every_check_of_stages_is_broken_once():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("source", [GOOD, FILTER, ROWS])
+@pytest.mark.parametrize("source", [GOOD, FILTER, ROWS, SHOWN])
 def test_the_same_stage_unbroken_passes_all(examine_plugin, source):
     found = examine_plugin("stage", source)
     assert found.passed, [one.explain() for one in found.results if not one.passed]

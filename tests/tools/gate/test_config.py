@@ -34,6 +34,7 @@ F1 = "[{metric: f1, scoring: frame, minimum: 0.9}]"
         ({"accuracy": "[{metric: f1, scoring: frame, minimum: 0.1, maximum: 1}]"}, "found minimum and maximum"),
         ({"accuracy": "[{metric: mae, scoring: frame, minimum: 0.1}]"}, "of 'mae' lower is better"),
         ({"accuracy": "[{metric: f1, scoring: frame, maximum: 0.1}]"}, "of 'f1' higher is better"),
+        ({"accuracy": "[{metric: gospa, scoring: frame, maximum: 0.1}]"}, "no meaning in the scoring frame: it is for"),
         ({"accuracy": "[{metric: bias, scoring: frame, no_worse_than: run}]"}, "neither end is better"),
         ({"accuracy": "[{metric: f1, scoring: frame, minimum: 0.1, tolerance: 1}]"}, "belong to no_worse_than"),
         ({"accuracy": "[{metric: f1, scoring: frame, minimum: 0.1, dataset: capture}]"}, "Did you mean 'captures'?"),

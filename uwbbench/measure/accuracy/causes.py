@@ -4,8 +4,8 @@ Conventions
 -----------
 * Causes add up to the misses of a scoring, kinds to its false detections: each error has exactly one, the first of the
   lists below that holds. *Near* is within the gate by the table's error, in range or in position.
-* A miss of ``object`` and ``track`` is an obstacle in a frame; one of ``frame`` and ``peak`` is a frame, and of its visible obstacles
-  the one counts whose echo came furthest through the detector, by the lists below.
+* A miss of ``object`` and ``track`` is an obstacle in a frame; one of ``frame`` and ``peak`` is a frame, and of its
+  visible obstacles the one counts whose echo came furthest through the detector, by the lists below.
 * Causes of a miss:
 
   1. ``shared``: a detection is near, but belongs to another obstacle.

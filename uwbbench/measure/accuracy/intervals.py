@@ -111,15 +111,14 @@ def share(num: ArrayLike, den: ArrayLike, *, confidence: float = CONFIDENCE, blo
     n, d = np.asarray(num, float), np.asarray(den, float)
     value = _ratio(n, d)
     outer_low, outer_high = exact(value, effective(d), confidence)
-    ends = [_student_ends(n, d, "logit", confidence, blocks)]
-    if blocks is None:
+    if blocks is None:  # as it is, with half a unit that fails, and with half a one that does not
         half = d.sum(-1, keepdims=True) / np.maximum(2 * np.count_nonzero(d, axis=-1, keepdims=True), 1)
-        more = np.concatenate([d, half], axis=-1)
-        ends += [
-            _student_ends(np.concatenate([n, part], -1), more, "logit", confidence, None) for part in (0 * half, half)
-        ]
-    low = np.fmax(np.fmin.reduce([value, *(low for low, _ in ends)]), outer_low)
-    high = np.fmin(np.fmax.reduce([value, *(high for _, high in ends)]), outer_high)
+        n = np.stack([np.concatenate([n, part * half], axis=-1) for part in (0, 0, 1)])
+        d = np.stack([np.concatenate([d, part * half], axis=-1) for part in (0, 1, 1)])
+    lows, highs = _student_ends(n, d, "logit", confidence, blocks)
+    if blocks is None:
+        lows, highs, d = np.fmin.reduce(lows), np.fmax.reduce(highs), d[0]
+    low, high = np.fmax(np.fmin(value, lows), outer_low), np.fmin(np.fmax(value, highs), outer_high)
     inner = (np.count_nonzero(d, axis=-1) >= INNER_UNITS) | (blocks is not None)
     return Interval(value, np.where(inner, low, outer_low), np.where(inner, high, outer_high), outer_low, outer_high)
 

@@ -204,6 +204,24 @@ def pooled(parts: Sequence[RankedCounts]) -> RankedCounts:
     )
 
 
+def without_each(parts: Sequence[RankedCounts]) -> list[float]:
+    """Average precision of several captures together, without each of them in turn.
+
+    What a capture adds is taken out of what all add at their common thresholds: they are sorted once.
+    """
+    whole = pooled(parts)
+    areas = []
+    for part in parts:
+        place = np.searchsorted(-whole.score, -part.score)
+        tp, fp = whole.tp.copy(), whole.fp.copy()
+        tp[place] -= part.tp
+        fp[place] -= part.fp
+        rest = [one for one in parts if one is not part]
+        there, exhaustive = whole.there - part.there, all(one.exhaustive for one in rest)
+        areas.append(dataclasses.replace(whole, tp=tp, fp=fp, there=there, exhaustive=exhaustive).average_precision)
+    return areas
+
+
 def _steps(
     frame: IntArray, score: FloatArray, cost_m: FloatArray, wall: BoolArray, gate_m: float
 ) -> tuple[IntArray, IntArray]:

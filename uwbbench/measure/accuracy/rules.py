@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any, get_args
 
@@ -48,6 +48,8 @@ class ScoringRules:
         What the error of a position is the distance to: the outline, 0 inside, or what the receiver sees of it.
     regions : tuple of (str, Region)
         Datasets of a run, by label, that have a region of their own; see :meth:`of`.
+    only : tuple of str or None
+        Datasets of a run, by label, that are scored like this; None: all. See :func:`rules_on`.
 
     Raises
     ------
@@ -61,10 +63,11 @@ class ScoringRules:
     strongest: int | None = None
     surface: Surface = "outline"
     regions: tuple[tuple[str, Region], ...] = ()
+    only: tuple[str, ...] | None = None
 
     def of(self, dataset: str) -> ScoringRules:
         """Rules of the captures of one dataset of a run, by its label."""
-        return replace(self, region=dict(self.regions).get(dataset, self.region), regions=())
+        return replace(self, region=dict(self.regions).get(dataset, self.region), regions=(), only=None)
 
     @property
     def one_to_one(self) -> bool:
@@ -72,16 +75,18 @@ class ScoringRules:
         return self.scoring in ("object", "track", "segment")
 
     def to_dict(self) -> dict[str, Any]:
-        """Rules as plain values; regions of datasets only where there are any, as earlier versions had none."""
-        facts = asdict(self)
-        regions = {label: asdict(region) for label, region in self.regions}
-        return {**facts, "regions": regions} if regions else {k: v for k, v in facts.items() if k != "regions"}
+        """Rules as plain values; what is of single datasets only where there is any, as earlier versions had none."""
+        facts = {name: value for name, value in asdict(self).items() if name not in ("regions", "only")}
+        if self.regions:
+            facts["regions"] = {label: asdict(region) for label, region in self.regions}
+        return facts if self.only is None else {**facts, "only": list(self.only)}
 
     @classmethod
     def from_dict(cls, facts: Mapping[str, Any]) -> ScoringRules:
         """Rules from plain values."""
         regions = tuple((label, Region(**region)) for label, region in facts.get("regions", {}).items())
-        return cls(**{**facts, "region": Region(**facts["region"]), "regions": regions})
+        only = tuple(facts["only"]) if "only" in facts else None
+        return cls(**{**facts, "region": Region(**facts["region"]), "regions": regions, "only": only})
 
     def __post_init__(self) -> None:
         if self.surface not in get_args(Surface):
@@ -92,3 +97,8 @@ class ScoringRules:
             raise ScoringError(f"gate_m must be positive and finite, not {self.gate_m}")
         if self.strongest is not None and self.strongest < 1:
             raise ScoringError(f"strongest must be at least 1, not {self.strongest}")
+
+
+def rules_on(rules: Iterable[ScoringRules], dataset: str) -> list[ScoringRules]:
+    """Rules by which the captures of one dataset of a run, by its label, are scored."""
+    return [rule.of(dataset) for rule in rules if rule.only is None or dataset in rule.only]

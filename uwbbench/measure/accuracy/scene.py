@@ -48,8 +48,15 @@ class Scene:
     unprocessed: int
 
     @classmethod
-    def of(cls, detections: Detections, header: CaptureHeader) -> Scene:
+    def of(cls, detections: Detections, header: CaptureHeader, sight: Sight | None = None) -> Scene:
         """Scene of a capture for a detector's output.
+
+        Parameters
+        ----------
+        detections : Detections
+        header : CaptureHeader
+        sight : Sight, optional
+            Of the capture's objects, where it is known from another detector's output.
 
         Raises
         ------
@@ -66,7 +73,7 @@ class Scene:
                     f"the detections name frame {outside[0]}, but capture '{header.name}' has {frames} frames; "
                     "they come from another capture"
                 )
-        sight = truth.seen_from(header.radar, header.trajectory)
+        sight = sight or truth.seen_from(header.radar, header.trajectory)
         labelled = np.isfinite(sight.range_m) & np.isfinite(sight.azimuth_rad)
         obstacle = np.array([not item.structure for item in truth.objects], bool)
         known = labelled.all(axis=1) if truth.exhaustive else (labelled & obstacle).any(axis=1)

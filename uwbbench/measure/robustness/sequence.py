@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from uwbbench.api.arrays import ComplexArray, IntArray
-from uwbbench.api.case import Evidence, Violation, hard_case
+from uwbbench.api.case import Evidence, NotApplicable, Violation, hard_case
 from uwbbench.api.errors import CaptureError
 from uwbbench.measure.robustness.compare import flipped_share, hit_share, in_frames, still_found, unchanged
 from uwbbench.measure.robustness.scene import FRAMES, NOISE, altered, approach, chosen
@@ -13,6 +13,18 @@ from uwbbench.measure.robustness.subject import Subject
 
 LOSS = 0.10
 """Share of the frames in which an echo may be missed that is found without the disturbance."""
+
+
+def _frame_by_frame(subject: Subject) -> None:
+    """Leave out what one answer for a window of frames cannot do.
+
+    Raises
+    ------
+    NotApplicable
+        If a stage gives such an answer.
+    """
+    if any(stage.whole_windows for _, stage in subject.stages()):
+        raise NotApplicable("the detector gives one answer for a whole window, which hangs on all of its frames")
 
 
 def _usual_share(subject: Subject, rows: IntArray) -> float:
@@ -28,6 +40,7 @@ def _survives(subject: Subject, rows: IntArray, timestamp_s: np.ndarray | None =
 @hard_case("survive")
 def lost_frames(subject: Subject) -> Evidence:
     """With every fifth frame lost, and 20 frames in a row, the echo is found in as large a share of the others."""
+    _frame_by_frame(subject)
     kept = np.array([row for row in range(FRAMES) if row % 5 != 2 and not 70 <= row < 90])
     return _survives(subject, kept)
 
@@ -63,6 +76,7 @@ def time_going_backwards(subject: Subject) -> Evidence:
 @hard_case("equal")
 def one_frame_capture(subject: Subject) -> Evidence:
     """A capture of one frame yields what that frame yields at the start of a longer one."""
+    _frame_by_frame(subject)
     first = np.array([0])
     return unchanged(subject.run(chosen(subject.capture, first)), in_frames(subject.usual, first), 0.0)
 
@@ -107,6 +121,7 @@ def interference_bursts(subject: Subject) -> Evidence:
     Judged 80 frames later, where at most a tenth of the detections may come or go: a background that averages has
     taken the burst in, and must have forgotten it.
     """
+    _frame_by_frame(subject)
     burst = NOISE * 100
     rng = np.random.default_rng(11)
 

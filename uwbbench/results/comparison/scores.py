@@ -22,6 +22,7 @@ from uwbbench.api.errors import ScoringError
 from uwbbench.api.metric import Metric, Outcome
 from uwbbench.measure.accuracy.boards import holm
 from uwbbench.measure.accuracy.metrics.choice import MetricChoice
+from uwbbench.measure.accuracy.rules import rules_on
 from uwbbench.measure.accuracy.scoring import ScoringRules, outcomes
 from uwbbench.measure.accuracy.stats import Difference, evaluate, paired_difference
 from uwbbench.results.comparison.units import Unit
@@ -105,11 +106,9 @@ def score_changes(
     boards: dict[Board, dict[str, list[tuple[Outcome, Outcome, str]]]] = defaultdict(lambda: defaultdict(list))
     missing: dict[str, None] = {}
     for unit in units:
-        for rule in rules:
+        for rule in rules_on(rules, unit.dataset):
             try:
-                before, after = (
-                    outcomes(detections, unit.header, rule.of(unit.dataset)) for detections in unit.detections
-                )
+                before, after = (outcomes(detections, unit.header, rule) for detections in unit.detections)
             except ScoringError as error:
                 missing[f"not judged by {rule.scoring}: {error}"] = None
                 continue

@@ -2,6 +2,7 @@
 
 Conventions
 -----------
+* Bounds are no detectors, and left out.
 * A detector is compared with itself, of the same identity, on each board of both halves, in the metric that ranks.
 * Captures of the same name are of the same scene with other draws; the difference is paired over them, and its p-value
   adjusted after Holm over all detectors and boards.
@@ -68,7 +69,7 @@ def changes(public: Sequence[Ranking], private: Sequence[Ranking]) -> list[Chang
         hidden = {one.contender.key: one for one in other[ranking.board].standings}
         metric = ranking.metrics[ranking.main]
         for one in ranking.standings:
-            if one.contender.key not in hidden:
+            if one.contender.bound or one.contender.key not in hidden:
                 continue
             its = hidden[one.contender.key]
             sides = [{part.capture: part for part in scored} for scored in (its.scored, one.scored)]

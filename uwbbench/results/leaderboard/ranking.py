@@ -45,7 +45,8 @@ class Standing:
     scored : tuple of Scored
     estimates : mapping of str to Estimate
     ranks : (int, int) or None
-        Smallest and largest rank that it may have; None where it was not scored on all captures, or scenes are too few.
+        Smallest and largest rank that it may have; None for a bound, where it was not scored on all captures, or where
+        scenes are too few.
     speed : Speed or None
     """
 
@@ -132,8 +133,9 @@ def _ranking(suite: Suite, board: Board, members: Mapping[str, list[Scored]]) ->
     estimates = {key: estimates_of(metrics, scored, SETTINGS) for key, scored in members.items()}
     speeds = speeds_of(suite, board[0])
     times = {key: speed.ratio for key, speed in speeds.items()}
-    ranks = ranks_of(members, metrics, estimates, times, metrics.compared(exhaustive=exhaustive))
     contenders = {one.key: one for one in suite.contenders}
+    bounds = {key for key in members if contenders[key].bound}
+    ranks = ranks_of(members, metrics, estimates, times, metrics.compared(exhaustive=exhaustive), bounds)
     standings = [
         Standing(contenders[key], tuple(members[key]), estimates[key], ranks.sets.get(key), speeds.get(key))
         for key in ranks.order

@@ -70,6 +70,11 @@ class Contender:
         """What distinguishes it from all others."""
         return digest([self.name, self.identity])
 
+    @property
+    def bound(self) -> bool:
+        """Whether it is no detector, but bounds what detectors can reach."""
+        return any(self.name in run.folder.bounds for run in self.runs)
+
     @cached_property
     def scored(self) -> list[Scored]:
         """What counts, with the key as the detector's name."""

@@ -113,7 +113,8 @@ def read_parquet(path: Path) -> tuple[pa.Table, Any]:
     try:
         with disk_errors(path, "read"):
             # Not read_table(path): that takes "key=value" folders above the file for columns.
-            table = pq.ParquetFile(path).read()
+            # One thread: the files of a run are many and small, and a thread for each column costs more than it reads.
+            table = pq.ParquetFile(path).read(use_threads=False)
     except pa.ArrowException as error:
         raise StoreError(f"{path}: is not a readable Parquet file: {error}") from error
     return table, json.loads((table.schema.metadata or {}).get(_FACTS, b"{}"))

@@ -28,6 +28,7 @@ from uwbbench.api.arrays import FloatArray
 from uwbbench.api.capture import CaptureHeader
 from uwbbench.api.detections import Detections
 from uwbbench.api.errors import StoreError
+from uwbbench.config.detector import REFERENCE
 from uwbbench.measure.accuracy.ranked import RankedCounts
 from uwbbench.measure.accuracy.scoring import ScoringRules
 from uwbbench.run.folder import journal, tables
@@ -87,6 +88,16 @@ class RunFolder:
     def scene(self, dataset: str, capture: str) -> str:
         """Scene or set-up that a capture is of: its own name, unless the run knows which captures repeat it."""
         return str(self.manifest.get("scenes", {}).get(dataset, {}).get(capture, capture))
+
+    @property
+    def bounds(self) -> frozenset[str]:
+        """Names of those that are no detectors, but bound what detectors can reach.
+
+        Runs of earlier versions do not say it; in these, they are those whose files call them references.
+        """
+        detectors = self.manifest["experiment"]["detectors"]
+        references = [config["name"] for config in detectors if config.get("fidelity") == REFERENCE]
+        return frozenset(self.manifest.get("bounds", references))
 
     def update_manifest(self, **values: Any) -> None:
         """Replace top-level values of the manifest, and break its seal: more results are to come."""

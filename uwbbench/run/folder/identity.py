@@ -24,12 +24,20 @@ if TYPE_CHECKING:
     from uwbbench.measure.accuracy.scoring import ScoringRules
 
 
+_PLAIN = frozenset({str, int, bool, type(None)})
+
+
 def plain(value: Any) -> Any:
     """Value made of JSON's types only.
 
     Keys become text, tuples and arrays lists, NumPy scalars Python's. NaN and infinities, which JSON lacks, become
     null: a number that is undefined.
     """
+    kind = type(value)
+    if kind is float:  # most values of a report are plain already
+        return value if math.isfinite(value) else None
+    if kind in _PLAIN:
+        return value
     if isinstance(value, Mapping):
         return {str(key): plain(item) for key, item in value.items()}
     if isinstance(value, np.ndarray):

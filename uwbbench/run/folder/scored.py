@@ -29,7 +29,14 @@ CAUSES = "causes"
 def rules_of(experiment: Mapping[str, Any]) -> tuple[ScoringRules, ...]:
     """Scoring rules of an experiment as the manifest holds it, one for each scoring."""
     region = _region(experiment["region"])
-    regions = tuple((used["label"], _region(used["region"])) for used in experiment["datasets"] if "region" in used)
+    datasets = experiment["datasets"]
+    regions = tuple((used["label"], _region(used["region"])) for used in datasets if "region" in used)
+    some = any("scoring" in used for used in datasets)
+
+    def only(scoring: str) -> tuple[str, ...] | None:
+        """Datasets that are scored like this; None where no dataset says how it is scored."""
+        return tuple(used["label"] for used in datasets if scoring in used.get("scoring", [scoring])) if some else None
+
     return tuple(
         ScoringRules(
             scoring,
@@ -38,6 +45,7 @@ def rules_of(experiment: Mapping[str, Any]) -> tuple[ScoringRules, ...]:
             experiment["strongest"],
             experiment.get("surface", "outline"),
             regions,
+            only(scoring),
         )
         for scoring in experiment["scoring"]
     )

@@ -24,6 +24,7 @@ from uwbbench.api.errors import UwbbenchError
 from uwbbench.api.text import one_line, printable
 from uwbbench.config.detector import RESULTS, detector_identity, from_results
 from uwbbench.measure.accuracy.metrics.choice import MetricChoice, names_of
+from uwbbench.measure.accuracy.rules import rules_on
 from uwbbench.measure.accuracy.scoring import column_of
 from uwbbench.run.folder.folder import RunFolder
 from uwbbench.run.folder.identity import (
@@ -212,7 +213,7 @@ class _Verifier:
 
     def _accuracy(self, entry: Entry) -> None:
         sha256 = self._content(entry)
-        rules = [rule.of(entry.dataset) for rule in rules_of(self.manifest["experiment"])]
+        rules = rules_on(rules_of(self.manifest["experiment"]), entry.dataset)
         self._identity(entry, [accuracy_identity(self._detector_of(entry), sha256, rules)])
         detections, header = self.folder.detections(entry.unit), self.folder.header(entry.capture_id)
         counts = {"frames": len(header), "processed": len(detections.processed), "detections": len(detections)}
@@ -227,7 +228,7 @@ class _Verifier:
         self._same(f"journal.jsonl, {_about(entry)}", entry.scores, again)
         for row in entry.scores:
             self._causes(f"journal.jsonl, {_about(entry)}", row)
-        stored = [rule.of(entry.dataset) for rule in self.folder.rules]
+        stored = rules_on(self.folder.rules, entry.dataset)
         self.sound[entry.unit] = again if stored == rules else score_rows(detections, header, stored)
         self._count("units scored again")
         if REPORTED_FACT in entry.facts:

@@ -9,7 +9,7 @@ from uwbbench.measure.accuracy.intervals import INNER_UNITS
 from uwbbench.results.curves import ErrorCurve, error_axis
 from uwbbench.results.slices import Slice
 from uwbbench.show.charts.chart import PLAIN_NUMBERS, Series, Spec, axis, chart
-from uwbbench.show.text.numbers import number
+from uwbbench.show.text.numbers import number, rounded
 from uwbbench.show.text.quantity import Quantity
 
 SHARES = (0, 0.25, 0.5, 0.75, 0.9, 0.95, 1)
@@ -41,9 +41,9 @@ def by_range(title: str, slices: Sequence[Slice], spans: Sequence[str], names: M
                 {
                     "detector": names[part.detector],
                     "span": part.span,
-                    "value": value,
-                    "low": value if math.isnan(low) else low,
-                    "high": value if math.isnan(high) else high,
+                    "value": rounded(value),
+                    "low": rounded(value if math.isnan(low) else low),
+                    "high": rounded(value if math.isnan(high) else high),
                     "text": by.in_full(estimate),
                 }
             )
@@ -104,7 +104,7 @@ def error_cdf(title: str, curves: Mapping[str, ErrorCurve], names: Mapping[str, 
         percentiles = ", ".join(f"{what} {number(value, 1, 100)}" for what, value, _ in known)
         label = names[detector]
         rows += [
-            {"detector": label, "error": max(100 * error_m, least), "share": share}
+            {"detector": label, "error": rounded(max(100 * error_m, least)), "share": rounded(share)}
             for error_m, share in zip(curve.error_m.tolist(), curve.share.tolist(), strict=True)
         ]
         points += [

@@ -65,14 +65,14 @@ def radargram(title: str, case: Case, image: tuple[str, float] | None, names: Ma
             "encoding": {"x": x, "y": y, **_nearness(), "tooltip": tooltip},
         }
     )
-    layers += [  # above the detections, thinner than they are wide: neither hides the other
+    lines = [  # above the detections, thinner than they are wide: neither hides the other
         {
-            "data": {"values": truth},
             "mark": {"type": "line", "clip": True, "style": look},
             "encoding": {"x": x, "y": y, "detail": {"field": "object"}},
         }
         for look in ("halo", "range")
     ]
+    layers.append({"data": {"values": truth}, "layer": lines})
     samples = "grey: amplitude, 50 dB down to white" if image else "the samples are not at hand"
     return chart(title, f"Green line: true range; {samples}.", layers, params=[_chosen(names[case.leader])])
 

@@ -108,6 +108,8 @@ def speed_against_error(title: str, points: Sequence[Point], names: Mapping[str,
         f"Better: left and {better}. Filled, with its probability P: on the front, where no other is both as "
         "fast and as good."
     )
+    if any(point.bound for point in points):
+        subtitle += " Bounds are no detectors, and put nobody off it."
     return chart(title, subtitle, layers, data={"values": rows})
 
 

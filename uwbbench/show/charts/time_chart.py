@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 from uwbbench.api.arrays import FloatArray
 from uwbbench.results.curves import tail_curve
 from uwbbench.show.charts.chart import Series, Spec, axis, chart, deadline
-from uwbbench.show.text.numbers import significant
+from uwbbench.show.text.numbers import rounded, significant
 
 MARKED = (0.5, 0.1, 0.01)
 """Shares of calls at which a curve has its detector's mark: P50, P90 and P99."""
@@ -36,14 +37,14 @@ def latency(
     timed : str
         What the times are of, in words.
     """
-    rows = []
+    rows: list[dict[str, Any]] = []
     for detector, times in times_us.items():
         slow_us, share = tail_curve(times)
         rows += [
             {
                 "detector": names[detector],
-                "time": time,
-                "share": part,
+                "time": rounded(time),
+                "share": rounded(part),
                 "text": f"{part:.2%} of {len(times)} calls take {significant(time, 3)} us or longer",
             }
             for time, part in zip(slow_us.tolist(), share.tolist(), strict=True)

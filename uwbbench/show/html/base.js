@@ -31,7 +31,9 @@ const base = (() => {
   function sortBy(table, column, descending) {
     const body = table.tBodies[0], sign = descending ? -1 : 1;
     const rows = [...body.rows].map((row) => [keyOf(row.cells[column]), row]);
-    rows.sort(([a], [b]) => {
+    rows.sort(([a, one], [b, other]) => {
+      const last = ("last" in one.dataset) - ("last" in other.dataset);
+      if (last) return last;
       if (a === null || b === null) return (a === null) - (b === null);
       if (typeof a === "number" && typeof b === "number") return sign * (a - b);
       return sign * String(a).localeCompare(String(b), "en", { numeric: true });

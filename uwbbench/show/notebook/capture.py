@@ -29,6 +29,8 @@ def capture(shown: CaptureHeader) -> str:
         "citation": shown.citation,
         "about": shown.description,
     }
+    if isinstance(shown, Capture) and shown.background is not None:
+        facts["background"] = f"{len(shown.background)} frames with nothing in view"
     image = _radargram(shown) if isinstance(shown, Capture) else ""
     return elements.frame("capture", shown.name, elements.facts(facts), image, simulated=shown.source == "simulated")
 

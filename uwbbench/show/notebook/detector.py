@@ -28,6 +28,7 @@ def _step(number: int, step: Step) -> str:
         return elements.folded(f"{number}. <strong>{elements.text(step.label)}</strong>", elements.notes([error]))
     use = "" if step.use == step.label else f" ({elements.text(step.use)})"
     tags = ["optional: left out where the capture lacks what it needs"] if step.optional else []
+    tags += [f"left out where {step.unless} is in use"] if step.unless else []
     tags += [f"inserted for {step.implied_by}"] if step.implied_by else []
     tag = f" <em>{elements.text('; '.join(tags))}</em>" if tags else ""
     summary = f"{number}. <strong>{elements.text(step.label)}</strong>{use}: {elements.text(describe(stage))}{tag}"

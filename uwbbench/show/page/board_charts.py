@@ -53,7 +53,8 @@ def pareto(content: Content, board: Board, name: str) -> Spec | None:
     for one in content.boards[board]:
         members[one.detector].append(one)
     speeds = content.speeds.get(board[0], {})
-    placed = points(members, speeds, content.report.metrics[name], content.report.settings)
+    report = content.report
+    placed = points(members, speeds, report.metrics[name], report.settings, report.bounds)
     if not placed:
         return None
     quantity = content.quantities[name]

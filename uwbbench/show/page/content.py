@@ -86,10 +86,14 @@ class Content:
     def leaders(self) -> dict[tuple[str, str], str]:
         """First detector of each dataset and source, on its first board."""
         leaders: dict[tuple[str, str], str] = {}
-        first = self.report.experiment["scoring"][0] if self.estimates else ""
-        scorings = {about["scoring"] for about, _ in self.estimates}
+        order = self.report.experiment["scoring"]
+        first: dict[str, int] = {}  # scoring of each dataset that comes first among those of the run
         for about, _ in self.estimates:
-            if about["table"] == "filtering" and (about["scoring"] == first or first not in scorings):
+            place = order.index(about["scoring"]) if about["scoring"] in order else len(order)
+            first[about["dataset"]] = min(place, first.get(about["dataset"], place))
+        for about, _ in self.estimates:
+            place = order.index(about["scoring"]) if about["scoring"] in order else len(order)
+            if about["table"] == "filtering" and place == first[about["dataset"]]:
                 leaders.setdefault((about["dataset"], about["source"]), about["detector"])
         return leaders
 
@@ -184,6 +188,7 @@ class Content:
         ]
         return {
             "detectors": list(self.detectors.values()),
+            "bounds": [name in self.report.bounds for name in self.report.detectors],
             "marks": [[one.path, one.colour] for one in self.marks.values()],
             "quantities": [vars(quantity) for quantity in self.quantities.values()],
             "boards": [self._board(board, materials) for board in boards],

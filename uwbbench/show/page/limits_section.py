@@ -52,7 +52,8 @@ def _charts(content: Content) -> Iterator[Spec]:
 
 def _error(known: Limits, content: Content) -> Iterator[str]:
     """Nearest to the bound at the lowest and the highest SNR, among those that find nearly all echoes."""
-    usual = [row for row in known.accuracy.to_dict("records") if row["share"] >= USUAL and row["rmse_m"] > 0]
+    rows = [row for row in known.accuracy.to_dict("records") if row["detector"] not in content.report.bounds]
+    usual = [row for row in rows if row["share"] >= USUAL and row["rmse_m"] > 0]
     if not usual:
         yield f"At no signal-to-noise ratio does any detector find {USUAL:.0%} of single echoes."
         return
@@ -82,7 +83,9 @@ def _rates(known: Limits, content: Content) -> Iterator[str]:
 
 def _apart(known: Limits, content: Content) -> Iterator[str]:
     """Smallest distance at which any detector resolves most pairs."""
-    rows = known.resolution.to_dict("records")
+    rows = [row for row in known.resolution.to_dict("records") if row["detector"] not in content.report.bounds]
+    if not rows:
+        return
     most = [row for row in rows if row["low"] > 0.5]
     nearest = min((row["separation_ns"] for row in most), default=None)
     best = max((row for row in most or rows if nearest in (None, row["separation_ns"])), key=lambda row: row["share"])

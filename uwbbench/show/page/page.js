@@ -1,7 +1,10 @@
-(() => {
-  const read = (id) => JSON.parse(document.getElementById(id).textContent);
-  const data = read("data"), config = read("theme-config");
+(async () => {
   const at = (id) => document.getElementById(id);
+  if (!("DecompressionStream" in window)) { at("too-old").hidden = false; return; }
+  // What charts and leaderboard are made of is compressed: base64 of a zlib stream of JSON.
+  const bytes = Uint8Array.from(atob(at("data").textContent), (letter) => letter.charCodeAt(0));
+  const data = await new Response(new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"))).json();
+  const config = JSON.parse(at("theme-config").textContent);
   const { root, make, sortBy, sortable, markOf } = base;
 
   function fill(select, options, keep) {
@@ -143,12 +146,13 @@
       }
       head.append(line);
       const best = columns.map(({ one, index }) => {
-        const known = rows.filter((row) => row[8]).map((row) => row[7][index][0]).filter((value) => value !== null);
+        const known = rows.filter((row) => row[8] && !data.bounds[row[4]]).map((row) => row[7][index][0]).filter((value) => value !== null);
         if (known.length < 2 || one.better === "zero") return null;
         return one.better === "higher" ? Math.max(...known) : Math.min(...known);
       });
       for (const row of rows) {
         const tr = make("tr"), values = row[7];
+        if (data.bounds[row[4]]) tr.dataset.last = "yes";
         const who = make("th", undefined, { scope: "row" });
         who.append(markOf(data.marks[row[4]]), data.detectors[row[4]]);
         tr.append(who);
@@ -156,7 +160,7 @@
           const [value, low, high, n, groups] = values[index];
           const title = value === null ? "undefined here: nothing was retained, nothing was to be found, or too few samples" : `n = ${n} ${one.samples}, ${groups} groups`;
           const cell = cellOf(value, low, high, one.digits, one.factor, title);
-          if (value !== null && value === best[place] && row[8]) cell.classList.add("best");
+          if (value !== null && value === best[place] && row[8] && !data.bounds[row[4]]) cell.classList.add("best");
           return cell;
         });
         const times = data.times[board.timing][row[4]] ?? data.timed.map(() => ["not timed", "", null, ""]);

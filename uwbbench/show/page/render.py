@@ -7,7 +7,7 @@ Expressions of charts are interpreted, not compiled, as the page's policy asks.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -19,7 +19,7 @@ from uwbbench.show.charts.chart import Spec
 from uwbbench.show.charts.theme import PAGE, PRINT
 from uwbbench.show.extras import report_tools
 from uwbbench.show.html.cell import Table, table_of
-from uwbbench.show.html.render import badge, document, embedded
+from uwbbench.show.html.render import badge, document, embedded, packed
 from uwbbench.show.page.content import Content
 from uwbbench.show.page.sections import sections
 from uwbbench.show.text.formats import INDEX, MARK
@@ -53,9 +53,9 @@ def page(content: Content) -> str:
         sections=[(part, _tables(content, part.sheets), _tables(content, part.folded)) for part in parts],
         looks=content.looks,
         facts=_facts(session, report.experiment),
-        manifest=json.dumps(manifest, indent=2, ensure_ascii=False),
+        manifest=json.dumps(_without_hashes(manifest), indent=2, ensure_ascii=False),
         made=f"Made by uwbbench {session['versions']['uwbbench']} from a run started {session['started']}.",
-        data=embedded({**content.data(), "fixed": {part.id: part.charts for part in parts if part.charts}}),
+        data=packed({**content.data(), "fixed": {part.id: part.charts for part in parts if part.charts}}),
         config=embedded(PAGE),
     )
 
@@ -128,6 +128,14 @@ def _bundle() -> str:
         import vl_convert
     script: str = vl_convert.javascript_bundle()  # type: ignore[call-arg]  # its stub knows no default
     return script.replace("</script", "<\\/script").replace("<!--", "<\\!--")
+
+
+def _without_hashes(manifest: Mapping[str, Any]) -> dict[str, Any]:
+    """The manifest for people: of the hashes of all files, which are thousands, it says how many there are."""
+    shown = dict(manifest)
+    if "files" in shown:
+        shown["files"] = f"SHA-256 of {len(shown['files'])} files: in manifest.json of the run folder"
+    return shown
 
 
 def _facts(session: dict[str, Any], experiment: dict[str, Any]) -> list[tuple[str, str]]:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from uwbbench.results.verdicts import INTERVALS
+from uwbbench.results.verdicts import BOUNDS, INTERVALS
 from uwbbench.show.page import answer, error_sections, limits_section
 from uwbbench.show.page.limits_section import limits
 from uwbbench.show.page.section import Section
@@ -44,6 +44,12 @@ def published(content: Content) -> Section | None:
     return Section("published", "Published and here", sheets=sheets) if sheets else None
 
 
+def reported(content: Content) -> Section | None:
+    """What sources report of their methods, beside this run."""
+    sheets = tuple(Tables(content.report).reported())
+    return Section("reported", "Reported by source", sheets=sheets) if sheets else None
+
+
 def paper_first(content: Content) -> Section | None:
     """The paper's tables where the run repeats all of them: they are what it was made for."""
     return _paper(content) if content.report.repeats_the_paper else None
@@ -54,11 +60,12 @@ def leaderboard(content: Content) -> Section | None:
     if not content.boards:
         return None
     confidence = f"{content.report.experiment['intervals']['confidence']:.0%}"
-    notes = (
+    notes: tuple[str, ...] = (
         f"Value, and below it its {confidence} interval. {INTERVALS} Errors are those of all retained detections; "
         "\u201cof matches\u201d counts true positives only: read it with recall. n/a: undefined. Times of a frame are "
         f"{content.report.timed}; absolute ones hold on one machine only, the ratio travels.",
     )
+    notes += (BOUNDS,) if content.report.bounds else ()
     return Section("leaderboard", "Leaderboard", layout="leaderboard", notes=notes)
 
 
@@ -139,6 +146,7 @@ SECTIONS: tuple[Writer, ...] = (
     limits,
     paper_first,
     leaderboard,
+    reported,
     pareto,
     by_range,
     errors,

@@ -40,7 +40,7 @@ def pareto(ranking: Ranking, metric: str, title: str, names: Mapping[str, str]) 
         for one in ranking.standings
         if one.speed is not None
     }
-    drawn = points(members, speeds, ranking.metrics[metric], SETTINGS)
+    drawn = points(members, speeds, ranking.metrics[metric], SETTINGS, ranking.ranks.bounds)
     if not drawn:
         return None
     quantity = Quantity.of(metric, ranking.metrics[metric])

@@ -13,7 +13,7 @@ from uwbbench.results.leaderboard.runs import Run
 from uwbbench.results.leaderboard.suites import Contender, Suite
 from uwbbench.results.results import errors_in
 from uwbbench.results.times import WORDS as TIMED
-from uwbbench.results.verdicts import WITHIN, WORDS, listed
+from uwbbench.results.verdicts import BOUNDS, WITHIN, WORDS, listed
 from uwbbench.run.folder.identity import digest
 from uwbbench.show.html.cell import Cell, Table
 from uwbbench.show.looks import Look, looks
@@ -159,6 +159,8 @@ class Content:
     def _against(self, ranking: Ranking, leader: Standing, standing: Standing) -> Cell:
         if standing is leader:
             return Cell("first", key="-1")
+        if standing.contender.bound:
+            return Cell("bound", key="n/a")
         pair = ranking.pair(standing.contender.key, leader.contender.key, ranking.main)
         if pair is None:
             return Cell("n/a")
@@ -176,12 +178,14 @@ class Content:
         elif ranking.metrics.listed:
             yield f"The rank is by {quantity(ranking, ranking.main).title}."
         yield from ranking.metrics.notes
-        if all(one.ranks is None for one in ranking.standings):
+        if ranking.ranks.bounds:
+            yield BOUNDS
+        if not ranking.ranks.sets:
             there = "is 1" if ranking.ranks.scenes == 1 else f"are {ranking.ranks.scenes}"
             yield f"No ranks: {RANKED_UNITS} scenes are needed, and there {there}."
             if any(one.estimates[ranking.main].within for one in ranking.standings):
                 yield f"Intervals: {WITHIN}."
-        elif any(one.ranks is None for one in ranking.standings):
+        elif any(one.ranks is None and not one.contender.bound for one in ranking.standings):
             yield "– : no rank, as the detector was not scored on all captures of this board; its numbers are of fewer."
 
     def sentence(self, section: Section) -> str:
@@ -305,6 +309,7 @@ def _board_dict(ranking: Ranking) -> dict[str, Any]:
         "standings": [
             {
                 **who[one.contender.key],
+                "bound": one.contender.bound,
                 "rank": None if one.ranks is None else one.ranks[0],
                 "rank_high": None if one.ranks is None else one.ranks[1],
                 "captures": len(one.scored),

@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
+from uwbbench.measure.accuracy.boards import RANKED_UNITS
 from uwbbench.results.leaderboard.halves import Change, changes
 from uwbbench.results.leaderboard.suites import Suite
 from uwbbench.results.verdicts import WORDS
 from uwbbench.show.html.cell import Cell, Table
 from uwbbench.show.site.cells import metric_cell, quantity
 from uwbbench.show.text.numbers import interval, p_value
+from uwbbench.show.text.sheet import shown
 
 if TYPE_CHECKING:
     from uwbbench.show.site.content import Content
@@ -20,6 +22,9 @@ NOTE = (
     "than chance (paired over captures of the same name, adjusted for all detectors and datasets) and more than the "
     "margin; a detector that was tuned to the public captures does."
 )
+
+
+NEEDED = f"{RANKED_UNITS} of a dataset are needed"
 
 
 def halves(content: Content) -> Iterator[tuple[Suite, Suite, list[Change]]]:
@@ -46,11 +51,9 @@ def _table(content: Content, found: list[Change]) -> Table:
         difference = interval(d.value, d.low, d.high, by.digits, by.factor)
         cells = [metric_cell(by, estimate) for estimate in change.estimates]
         word = "loses" if change.loses else "better" if change.verdict == "differs" else WORDS[change.verdict]
-        named = (content.cell_of(change.contender), Cell(change.public.board[0]), Cell(by.title))
-        rows.append(
-            (*named, *cells, Cell(difference, key=f"{d.value:.6g}"), Cell(p_value(change.adjusted)), Cell(word))
-        )
-    columns = ("detector", "dataset", "metric", "public", "private", "private minus public", "adjusted p", "verdict")
+        named = (content.cell_of(change.contender), Cell(shown(change.public.board[0]), small=by.title), Cell(word))
+        rows.append((*named, *cells, Cell(difference, key=f"{d.value:.6g}"), Cell(p_value(change.adjusted))))
+    columns = ("detector", "dataset", "verdict", "public", "private", "private minus public", "adjusted p")
     return Table("Public and private half", columns, tuple(rows), (NOTE,))
 
 
@@ -60,6 +63,8 @@ def _sentence(content: Content, found: list[Change]) -> str:
     for change in found:
         if change.loses:
             losers.setdefault(content.labels[change.contender.key], []).append(change.public.board[0])
+    if all(change.verdict == "too few" for change in found):
+        return f"Too few scenes to decide whether a detector loses from the public to the private half: {NEEDED}."
     if not losers:
         return "No detector loses significantly from the public to the private half."
     said = "; ".join(f"{name} ({', '.join(datasets)})" for name, datasets in losers.items())

@@ -36,9 +36,8 @@ class Names:
             for key, one in contenders.items()
         }
         versioned |= {
-            key: marked(versioned[key], results_file=True)
+            key: marked(versioned[key], results_file=from_results(one.config), bound=one.bound)
             for key, one in contenders.items()
-            if from_results(one.config)
         }
         distinct = labels(versioned.values(), longest=60)
         self.detectors = {key: distinct[text] for key, text in versioned.items()}

@@ -12,7 +12,7 @@ from uwbbench.measure.accuracy.intervals import INNER_UNITS
 from uwbbench.results.leaderboard.ranking import SETTINGS, speeds_by_machine
 from uwbbench.results.leaderboard.suites import Contender, Suite
 from uwbbench.results.times import WORDS as TIMED
-from uwbbench.results.verdicts import INTERVALS, WORDS
+from uwbbench.results.verdicts import BOUNDS, INTERVALS, WORDS
 from uwbbench.show.html.cell import Cell, Table
 from uwbbench.show.html.render import badge
 from uwbbench.show.site.cells import metric_cell, pair_cell, quantity, rank_cell
@@ -223,9 +223,10 @@ def _detector(content: Content, contender: Contender) -> Page:
     mine = [(suite, one) for suite in content.suites for one in suite.contenders if one.key == contender.key]
     sections = [section for section in content.sections if any(suite is section.suite for suite, _ in mine)]
     label = content.names.detectors[contender.key]
+    said = (BOUNDS,) if contender.bound else ()
     parts = [
         Part("Results", tables=(_results(content, contender, sections),)),
-        Part("Against the others", tables=tuple(_others(content, contender, sections))),
+        Part("Against the others", notes=said, tables=tuple(_others(content, contender, () if said else sections))),
         Part(
             "Time",
             tables=(_times(content, mine),),
@@ -263,7 +264,7 @@ def _results(content: Content, contender: Contender, sections: list[Section]) ->
                     Cell(section.title, link=section.address),
                     Cell(content.names.suite(section.suite)),
                     Cell(f"{ranking.board[2]}, after {ranking.board[3]}"),
-                    replace(rank_cell(one), title=f"of {len(ranking.standings)}"),
+                    replace(rank_cell(one), title=f"of {len(ranking.standings) - len(ranking.ranks.bounds)}"),
                 ]
                 captures = Cell(f"{len(one.scored)} of {ranking.captures}")
                 cells = [
@@ -275,7 +276,7 @@ def _results(content: Content, contender: Contender, sections: list[Section]) ->
     return Table("On each dataset", columns, tuple(rows))
 
 
-def _others(content: Content, contender: Contender, sections: list[Section]) -> Iterator[Table]:
+def _others(content: Content, contender: Contender, sections: Sequence[Section]) -> Iterator[Table]:
     """Comparisons with all others on the first board of each dataset."""
     for section in sections:
         ranking = section.main

@@ -12,13 +12,14 @@ from uwbbench.measure.accuracy.intervals import INNER_UNITS, failing_share
 from uwbbench.measure.accuracy.metrics.choice import MetricChoice
 from uwbbench.results.report import Report
 from uwbbench.results.times import ROWS
-from uwbbench.results.verdicts import WITHIN, rank_text
+from uwbbench.results.verdicts import BOUNDS, WITHIN, rank_text
 from uwbbench.show.text.captures_sheets import captures_sheet, each_capture_sheet
 from uwbbench.show.text.error_sheets import cause_sheets, curve_sheets, main_causes
 from uwbbench.show.text.limits_sheets import limits_sheets
 from uwbbench.show.text.numbers import between, interval, number, time_us
 from uwbbench.show.text.paper_sheets import paper_sheets, published_sheets
 from uwbbench.show.text.quantity import Quantity, undefined_titles
+from uwbbench.show.text.reported_sheets import reported_sheets
 from uwbbench.show.text.sheet import Sheet, escaped, sentence, shown
 from uwbbench.show.text.wording import TABLES, set_aside_warning
 
@@ -30,6 +31,7 @@ def sheets(report: Report) -> list[Sheet]:
         tables.published,
         tables.limits,
         tables.leaderboards,
+        tables.reported,
         tables.causes,
         tables.curves,
         tables.paper,
@@ -55,6 +57,10 @@ class Tables:
     def published(self) -> Iterator[Sheet]:
         """Published figures beside this run's, where it covers the rows of the paper."""
         return self._labelled(published_sheets(self._report))
+
+    def reported(self) -> Iterator[Sheet]:
+        """What sources report of their methods, where any detector here is after one that does."""
+        return self._labelled(reported_sheets(self._report))
 
     def leaderboards(self) -> Iterator[Sheet]:
         """One for each dataset, scoring and table; test signals have tables of their own, and no leader."""
@@ -118,8 +124,9 @@ class Tables:
             yield from self._labelled([Sheet("Not scored", ("detector", "capture", "scoring", "reason"), rows)])
 
     def _labelled(self, tables: Iterable[Sheet]) -> Iterator[Sheet]:
-        """Tables that mark the rows of detectors whose results were read from files."""
-        labels = {shown(name): self._report.label(name, shown(name)) for name in self._report.read_only}
+        """Tables that mark the rows of bounds, and of detectors whose results were read from files."""
+        marked = self._report.read_only | self._report.bounds
+        labels = {shown(name): self._report.label(name, shown(name)) for name in marked}
         return (table.renamed("detector", labels) for table in tables)
 
 
@@ -197,6 +204,8 @@ def _leaderboard_notes(
     yield "Errors are those of all retained detections; 'of matches' counts true positives only: read it with recall."
     if metrics.listed:
         yield f"Ranked by {main.title}."
+    if any(about["bound"] for about, _ in members):
+        yield BOUNDS
     if open_world:
         yield (
             "The truth does not name all that is visible, so an unmatched detection proves nothing: "

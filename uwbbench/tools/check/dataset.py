@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from uwbbench.api import registry
 from uwbbench.api.capture import Capture
-from uwbbench.api.capture_file import open_capture, write_capture
+from uwbbench.api.capture_file import open_capture
+from uwbbench.api.capture_writing import write_capture
 from uwbbench.api.case import NotApplicable, last_line
 from uwbbench.api.dataset import Card, Dataset
 from uwbbench.api.errors import CaptureError

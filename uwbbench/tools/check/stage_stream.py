@@ -34,7 +34,7 @@ def open_starts_anew(subject: StageSubject) -> None:
 @check("uwbbench.api.stage.Stage.show_background")
 def background_may_come_in_blocks(subject: StageSubject) -> str:
     """The background, which is shown block by block, gives the same bits however it is cut."""
-    if "background" not in subject.cls.needs:
+    if "background" not in subject.needs:
         raise NotApplicable("the stage needs no background")
     for name, cuts in CUTS.items():
         stage = subject.opened()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import dataclasses
 from collections.abc import Mapping, Sequence
 from functools import cached_property
@@ -50,6 +49,11 @@ class StageSubject(ClassSubject):
         return working_params(self.cls.params_type(), self.given, f"stage '{self.name}'", self.name)
 
     @property
+    def needs(self) -> frozenset[str]:
+        """What it needs of a capture with these parameters."""
+        return frozenset(self.cls.needs_with(self.params))
+
+    @property
     def capture(self) -> Capture:
         """The usual capture."""
         return usual_capture()
@@ -77,7 +81,7 @@ class StageSubject(ClassSubject):
         stage.open(capture.radar)
         if "truth" in self.cls.needs and capture.truth is not None:
             stage.show_truth(capture.truth, capture.trajectory)
-        if "background" in self.cls.needs and capture.background is not None:
+        if "background" in self.needs and capture.background is not None:
             background = self.declared(behind_all(capture.background, self.cls.consumes))
             stage.show_background(iter(pieces(background, cuts)))
 
@@ -93,7 +97,7 @@ class StageSubject(ClassSubject):
 
     def declared(self, block: Block) -> Block:
         """Block with nothing but what this stage declares that it consumes and needs."""
-        return declared_parts(block, self.cls.consumes, self.cls.needs)
+        return declared_parts(block, self.cls.consumes, self.needs)
 
     def run(self, block: Block, cuts: Sequence[int] = (), stage: Stage[Any] | None = None) -> Values:
         """What the stage yields for a block handed over in pieces, the flush included.
@@ -210,13 +214,48 @@ def _makers() -> list[str]:
     return chain
 
 
-def _with_port(port: str, block: Block, made: frozenset[str], capture: Capture) -> tuple[Block, frozenset[str]]:
+def _with_port(
+    port: str, block: Block, made: frozenset[str], capture: Capture, waiting: frozenset[str] = frozenset()
+) -> tuple[Block, frozenset[str]]:
+    """Block behind the first stage that makes a port, and behind those that make what that one takes.
+
+    Parameters
+    ----------
+    port : str
+    block : Block
+    made : frozenset of str
+        Ports that are there already.
+    capture : Capture
+    waiting : frozenset of str
+        Ports that are being made with the help of this one, and cannot help to make it.
+
+    Raises
+    ------
+    UwbbenchError
+        If the only stages that make it refuse the capture.
+    Nonconformity
+        If no installed stage makes it.
+    """
+    refused: list[UwbbenchError] = []
+    waiting |= {port}
     for name in registry.entries("stages"):
-        with contextlib.suppress(UwbbenchError, NotApplicable):  # another stage may make it
-            if port in registry.load_plugin("stages", name).produces:
-                behind, known = _through(name, block, made, capture)
-                if port in known:
-                    return behind, known
+        try:
+            cls = registry.load_plugin("stages", name)
+            if port not in cls.produces or cls.consumes & waiting:
+                continue
+            behind, known = block, made
+            for other in sorted(cls.consumes - made):
+                behind, known = _with_port(other, behind, known, capture, waiting)
+            behind, known = _through(name, behind, known, capture)
+        except UwbbenchError as error:  # another stage may make it
+            refused.append(error)
+        except (NotApplicable, Nonconformity):
+            continue
+        else:
+            if port in known:
+                return behind, known
+    if refused:
+        raise refused[0]
     raise Nonconformity("ports that an installed stage makes", f"none that makes '{port}' from the usual ports")
 
 

@@ -23,7 +23,7 @@ from uwbbench.detect.pipeline import Pipeline
 from uwbbench.measure.accuracy.metrics.choice import check_applies, load_metric
 from uwbbench.measure.accuracy.scoring import Region, ScoringRules
 from uwbbench.results.chains import IN_CLUSTERS
-from uwbbench.run.experiment import DetectorUse
+from uwbbench.run.contenders import DetectorUse
 from uwbbench.tools.fit.files import ROBOT, Changes, changed, open_cell
 from uwbbench.tools.tune.config import Choices, Interval
 from uwbbench.tools.tune.search import within

@@ -9,8 +9,10 @@ from time import perf_counter
 
 from uwbbench.api.errors import UwbbenchError
 from uwbbench.api.interruption import by_plugin
+from uwbbench.config.detector import read_detector
 from uwbbench.config.source import CaptureRef
 from uwbbench.measure.latency.machine import machine
+from uwbbench.run.leaks import refuse_trained_on
 from uwbbench.run.plan import reason_of
 from uwbbench.tools.gate.accuracy import Found, accuracy_check, found_on
 from uwbbench.tools.gate.check import Aspect, Check, GateResult, GateVerdict
@@ -36,9 +38,15 @@ def run_gate(gate: Gate, progress: Progress = lambda _: None) -> GateResult:
     -------
     GateResult
         What could not be measured is a check with the verdict ``invalid``.
+
+    Raises
+    ------
+    ConfigError
+        If the head was trained on captures of the gate.
     """
     checks: list[Check] = []
     listed = _listed(gate, checks)
+    _refuse_trained_on(gate, listed)
     model = gate.model
     for label, refs in listed.items():
         checks += _accuracy(gate, label, refs, progress)
@@ -67,6 +75,14 @@ def _listed(gate: Gate, checks: list[Check]) -> dict[str, list[tuple[CaptureRef,
                 raise
             checks.append(_invalid("captures", source.label, reason_of(error)))
     return listed
+
+
+def _refuse_trained_on(gate: Gate, listed: Listed) -> None:
+    """Refuse a head of this environment that was trained on captures on which its accuracy would be judged."""
+    if not gate.model.accuracy or gate.head.python is not None:
+        return
+    head = read_detector(gate.head.detector, None, gate.head.set)
+    refuse_trained_on([head], ((f"{label}: {ref.name}", ref) for label, refs in listed.items() for ref, _ in refs))
 
 
 def _timed(listed: Listed, captures: Captures) -> list[tuple[str, CaptureRef]]:

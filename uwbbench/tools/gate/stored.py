@@ -8,6 +8,7 @@ from typing import Any
 
 from uwbbench.api.detections import Detections
 from uwbbench.api.errors import ConfigError, StoreError, nearest
+from uwbbench.measure.accuracy.rules import rules_on
 from uwbbench.run.folder.folder import RunFolder
 from uwbbench.run.folder.journal import Entry
 from uwbbench.run.folder.scored import score_rows
@@ -68,7 +69,7 @@ class StoredRun:
         about = {"detector": entry.detector, "dataset": entry.dataset, "capture": entry.capture}
         table = self.folder.scores().to_dict("records")
         stored = [row for row in table if all(row[key] == value for key, value in about.items())]
-        again = score_rows(found, header, [rule.of(entry.dataset) for rule in self.folder.rules])
+        again = score_rows(found, header, rules_on(self.folder.rules, entry.dataset))
         if len(stored) != len(again):
             self._refuse(entry, f"{len(stored)} rows of scores for {len(again)}")
         for row in again:

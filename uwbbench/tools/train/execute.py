@@ -11,6 +11,7 @@ from importlib.metadata import version
 from typing import Any, Literal
 
 from uwbbench.api import registry
+from uwbbench.api.arrays import locked
 from uwbbench.api.block import Block
 from uwbbench.api.errors import ConfigError
 from uwbbench.api.learning import Assessed, Example, LearnedParams, Trainable, Weights
@@ -227,9 +228,10 @@ def _fitted(training: Training, mine: Sequence[Prepared], chosen_by: Sequence[Pr
     assert isinstance(stage, Trainable)  # noqa: S101 - its parameters say so
     examples, validation = ([one.example for one in side] for side in (mine, chosen_by))
     try:
-        return stage.fit(examples, seed=training.model.seed, validation=validation)
+        weights = stage.fit(examples, seed=training.model.seed, validation=validation)
     except ConfigError as error:
         raise ConfigError(f"{training.name}: step '{training.step.label}': {error}") from None
+    return {name: locked(array) for name, array in weights.items()}  # as they are behind a file
 
 
 def _scores(training: Training, weights: Weights, examples: Sequence[Prepared]) -> list[Score]:

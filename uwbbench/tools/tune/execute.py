@@ -13,6 +13,7 @@ from uwbbench.api.override import with_values
 from uwbbench.api.yaml_file import YamlFile
 from uwbbench.config.detector import check_detector
 from uwbbench.detect.pipeline import Pipeline
+from uwbbench.run.leaks import refuse_trained_on
 from uwbbench.tools.tune.captures import Group, Labelled, grouped, opened, refuse_leaks
 from uwbbench.tools.tune.choice import StableZone, best_of, stable_zone
 from uwbbench.tools.tune.config import SearchModel, Tuning
@@ -106,6 +107,7 @@ def tune(tuning: Tuning, progress: Progress = lambda _: None) -> TuneOutcome:
     captures, held_out = opened(tuning.tuning), opened(tuning.held_out)
     progress("comparing their contents")
     refuse_leaks(captures, held_out, tuning.experiment)
+    refuse_trained_on([tuning.detector], ((one.text, one.capture) for one in (*captures, *held_out)))
     groups = grouped(tuning.model.groups, captures, held_out)
     if not groups:
         raise ConfigError(

@@ -1,0 +1,1 @@
+"""Smoothing: of energy along the taps, of ranges along the frames."""

@@ -1,0 +1,1 @@
+"""Tracks: what belongs together from frame to frame."""

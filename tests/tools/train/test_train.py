@@ -1,0 +1,192 @@
+"""Training: what is learned from, what is refused, and that the same seed gives the same bytes."""
+
+import json
+from typing import Any
+
+import numpy as np
+import pytest
+
+from uwbbench.api import ConfigError, Example
+from uwbbench.api.weights import load_weights
+from uwbbench.detect.pipeline import detector_from_yaml, load_detector
+from uwbbench.tools.train import publish, read_training, train
+from uwbbench.tools.train.execute import _captures, _prepared
+from uwbbench_detectors.classify.trees import Trees, TreesParams
+
+QUICK = {"trajectory.speed_m_s": 4.0}
+
+
+def use(*runs: int, label: str | None = None, robot: int = 1, targets: str = "*", scene: str = "coupling-outdoor"):
+    """Captures of the coupling scene: 31 frames each."""
+    return {
+        "use": "simulated",
+        **({} if label is None else {"name": label}),
+        "params": {"scenes": [scene], "set": {**QUICK, "robot_seed": robot}},
+        "captures": [f"{scene}/target-{targets}/{run}" for run in runs],
+    }
+
+
+def file(**changes: Any) -> dict[str, Any]:
+    """A training of a small forest."""
+    data = {
+        "name": "small",
+        "detector": "coupling-extra-trees",
+        "set": {"pipeline.classify.trees.params.trees": 8, "pipeline.classify.trees.params.min_samples_leaf": 3},
+        "training": [use(1, 2)],
+        "split": {"by": "room", "variants": "/target-[^/]+"},
+        "seed": 5,
+    }
+    return {**data, **changes}
+
+
+@pytest.mark.slow
+def test_the_same_seed_gives_the_same_bytes_and_another_one_others():
+    first, again, other = (train(read_training(file(seed=seed))) for seed in (5, 5, 6))
+    assert first.content == again.content
+    assert first.sha256 != other.sha256
+
+
+@pytest.mark.slow
+def test_what_was_trained_is_written_with_a_summary_and_runs(tmp_path):
+    trained = train(read_training(file(held_out=[use(3, label="others"), use(3, label="robot 2", robot=2)])))
+    path = tmp_path / "mine.safetensors"
+    summary = json.loads(publish(trained, path).read_text())
+    assert [one["on"] for one in summary["scores"]] == ["training: simulated", "held out: others", "held out: robot 2"]
+    assert summary["source"] == "simulated"
+    assert str(tmp_path) not in json.dumps(summary)
+    found = summary["scores"][0]
+    assert found["accuracy"] > 0.8
+    assert found["frames"] == 6 * 32
+    detector = tmp_path / "mine.yaml"
+    values = "{trees: 8, min_samples_leaf: 3, weights: mine.safetensors}"
+    detector.write_text(
+        f"schema: 1\nextends: coupling-extra-trees\nname: mine\nset:\n  pipeline.classify.trees.params: {values}\n"
+        "  pipeline.filter.probability.params.minimum: 0\n"
+    )
+    training = read_training(file())
+    (_, one, _), *_ = _captures(training, lambda _: None)
+    rows = load_detector(detector).run(one.capture)
+    assert len(rows)
+    assert np.allclose(sum(rows[f"class_probability_{name}"] for name in ("empty", "metal", "person")), 1)
+
+
+@pytest.mark.slow
+def test_each_fold_is_tried_on_rooms_that_its_weights_have_not_seen():
+    split = {"by": "room", "variants": "/target-[^/]+", "folds": 2}
+    trained = train(read_training(file(split=split)))
+    assert [one.on for one in trained.scores][1:] == ["fold 1 of 2, by room", "fold 2 of 2, by room"]
+    assert [(one.captures, one.units) for one in trained.scores][1:] == [(3, 1), (3, 1)]
+
+
+@pytest.fixture(scope="module")
+def examples() -> dict[str, list[Example]]:
+    """Captures of six rooms behind the steps before the trees: of four, and of the other two."""
+    training = read_training(
+        file(training=[use(1, 2, 3, 4, scene="coupling-indoor")], held_out=[use(5, 6, scene="coupling-indoor")])
+    )
+    captures = _captures(training, lambda _: None)
+    prepared = [_prepared(training, captures, place, lambda _: None) for place in range(len(captures))]
+    return {role: [one.example for one in prepared if one.role == role] for role in ("training", "held out")}
+
+
+def accuracy(stage: Trees, features: Any, label: Any, others: Any, true: Any) -> float:
+    stage.load(stage.learn(features, label, 1))
+    return float(np.mean(stage.probabilities(others).argmax(axis=1) == true))
+
+
+@pytest.mark.slow
+def test_shuffled_labels_are_learned_at_chance(examples):
+    """Frames of a room are alike, so that 24 captures of two rooms count as few; chance is 1/3 within 0.12."""
+    stage = Trees(TreesParams(weights=None, trees=30))
+    features, label = stage.labelled(examples["training"])
+    others, true = stage.labelled(examples["held out"])
+    shuffled = np.random.default_rng(2).permutation(label)
+    assert accuracy(stage, features, label, others, true) > 0.7
+    assert abs(accuracy(stage, features, shuffled, others, true) - 1 / 3) < 0.12
+
+
+@pytest.mark.slow
+def test_a_split_by_frames_would_promise_more_than_rooms_that_were_not_seen_give(examples):
+    stage = Trees(TreesParams(weights=None, trees=30))
+    features, label = stage.labelled(examples["training"])
+    others, true = stage.labelled(examples["held out"])
+    odd = np.arange(len(label)) % 2 == 1
+    by_frames = accuracy(stage, features[~odd], label[~odd], features[odd], label[odd])
+    assert by_frames > accuracy(stage, features, label, others, true) + 0.03
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        (
+            {"held_out": [use(2)]},
+            r"'simulated: coupling-outdoor/target-None/2' \(held out\) shares its recording or room",
+        ),
+        (
+            {"held_out": [use(2, targets="metal")], "training": [use(1, 2, targets="person")]},
+            "shares its recording or room",
+        ),
+        ({"validation": [use(1)]}, r"\(validation\) shares its recording or room with .* \(training\)"),
+        ({"held_out": [use(1, robot=2)]}, "shares its recording or room"),
+        ({"training": [use(1)]}, "all training captures are of one room"),
+        (
+            {"split": {"by": "room", "variants": "/target-[^/]+", "folds": 3}},
+            "3 folds, but training captures of 2 rooms",
+        ),
+        ({"training": [use(1, 2, targets="None")]}, "step 'classify.trees': no frame of the class 'metal'"),
+        (
+            {"set": {"pipeline.classify.trees.params.classes": {"metal": ["metal"]}}},
+            "object 'person' of material 'person' belongs to no class: list it in 'classes'",
+        ),
+    ],
+)
+def test_what_would_prove_nothing_is_refused(changes, message):
+    with pytest.raises(ConfigError, match=message):
+        train(read_training(file(**changes)))
+
+
+def test_what_an_experiment_scores_is_not_learned_from(tmp_path):
+    experiment = tmp_path / "mine.yaml"
+    scored = json.dumps({"schema": 1, "name": "mine", "detectors": ["cfar-ca"], "datasets": [use(2, targets="metal")]})
+    experiment.write_text(scored)
+    with pytest.raises(ConfigError, match="experiment 'mine' scores 'simulated: coupling-outdoor/target-metal/2'"):
+        train(read_training(file(), experiment=str(experiment)))
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"split": {"by": "frame"}}, "split.by: Input should be 'recording', 'scene' or 'room', found 'frame'"),
+        ({"split": {"by": "room"}}, "'variants' says which scenes are of one room"),
+        ({"split": {"by": "room", "variants": "("}}, "variants is no regular expression"),
+        ({"step": "align"}, r"detector 'coupling-extra-trees' has no step 'align' that learns. Known: classify.trees"),
+        ({"detector": "cfar-ca", "set": {}}, "steps of detector 'cfar-ca' that learn: none"),
+        ({"seeds": 3}, "unknown key 'seeds'. Did you mean 'seed'?"),
+    ],
+)
+def test_a_training_file_that_is_wrong_is_refused_with_its_key(changes, message):
+    with pytest.raises(ConfigError, match=message):
+        read_training(file(**changes))
+
+
+def test_the_shipped_training_files_are_fine():
+    for name in ("extra-trees", "random-forest", "neighbours", "logistic"):
+        training = read_training(f"coupling-{name}")
+        assert training.detector.name == f"coupling-{name}"
+
+
+def test_shipped_weights_fit_their_detectors_and_are_small(approach):
+    size = 0
+    for name in ("extra-trees", "random-forest", "neighbours", "logistic"):
+        detector = load_detector(f"coupling-{name}")
+        stage = next(one for one in detector.open(approach).stages if hasattr(one, "labelled"))
+        load_weights(stage, approach.radar)
+        size += sum(values.nbytes for values in stage._weights.values())
+    assert size < 1.2e6
+
+
+def test_weights_of_one_kind_of_tree_are_not_those_of_another(approach):
+    reference = load_detector("coupling-extra-trees").config.steps[2].params["weights"]
+    steps = f"[{{use: align}}, {{use: classify.trees, params: {{kind: random_forest, weights: {reference}}}}}]"
+    with pytest.raises(ConfigError, match="was learned with kind 'extra_trees', and kind is 'random_forest' here"):
+        detector_from_yaml(f"schema: 1\nname: x\npipeline: {steps}").open(approach)
