@@ -31,6 +31,8 @@ EXPECTED = {
     "background-ema",
     "background-svd",
     "entropy",
+    "dwt-lstm",
+    "dwt-bilstm",
     "null",
     "constant",
     "oracle",
