@@ -14,6 +14,7 @@ from uwbbench.results.report import Report
 from uwbbench.results.times import ROWS
 from uwbbench.results.verdicts import BOUNDS, WITHIN, rank_text
 from uwbbench.show.text.captures_sheets import captures_sheet, each_capture_sheet
+from uwbbench.show.text.class_sheets import class_sheets
 from uwbbench.show.text.error_sheets import cause_sheets, curve_sheets, main_causes
 from uwbbench.show.text.limits_sheets import limits_sheets
 from uwbbench.show.text.numbers import between, interval, number, time_us
@@ -32,6 +33,7 @@ def sheets(report: Report) -> list[Sheet]:
         tables.limits,
         tables.leaderboards,
         tables.reported,
+        tables.classes,
         tables.causes,
         tables.curves,
         tables.paper,
@@ -61,6 +63,10 @@ class Tables:
     def reported(self) -> Iterator[Sheet]:
         """What sources report of their methods, where any detector here is after one that does."""
         return self._labelled(reported_sheets(self._report))
+
+    def classes(self) -> Iterator[Sheet]:
+        """Which classes were taken for which, where detectors tell classes apart."""
+        return self._labelled(class_sheets(self._report))
 
     def leaderboards(self) -> Iterator[Sheet]:
         """One for each dataset, scoring and table; test signals have tables of their own, and no leader."""
