@@ -34,6 +34,8 @@ EXPECTED = {
     "entropy",
     "walker-rpca",
     "walker-svd",
+    "dwt-lstm",
+    "dwt-bilstm",
     "null",
     "constant",
     "oracle",
