@@ -85,6 +85,12 @@ def pareto(content: Content) -> Section | None:
     return Section("pareto", "Speed against error", of_board=("pareto",), notes=(note,))
 
 
+def classes(content: Content) -> Section | None:
+    """Which classes were taken for which."""
+    sheets = tuple(Tables(content.report).classes())
+    return Section("classes", "Classes", sheets=sheets) if sheets else None
+
+
 def by_range(content: Content) -> Section | None:
     """The chosen metric against distance."""
     return Section("range", "Error by distance", of_board=("range",)) if _draws(content, "range") else None
@@ -148,6 +154,7 @@ SECTIONS: tuple[Writer, ...] = (
     paper_first,
     leaderboard,
     reported,
+    classes,
     pareto,
     by_range,
     errors,
