@@ -13,7 +13,7 @@ from uwbbench.api.detections import Detections
 from uwbbench.api.errors import PluginError
 from uwbbench.api.frames import Frames
 
-PER_FRAME = ("first_path", "noise_rms", "profile", "aligned", "window_mean", "window_sd")
+PER_FRAME = ("first_path", "noise_rms", "profile", "aligned", "window_mean", "window_sd", "features")
 """Parts of a block that have a row for each frame."""
 
 
@@ -38,6 +38,8 @@ class Block:
         Magnitudes that count from the first path, on bins of their own. Port ``aligned``.
     window_mean, window_sd : WindowProfile or None
         Mean and standard deviation of aligned magnitudes over windows of frames. Ports of the same names.
+    features : (frames, taps, features) array or None
+        Numbers that describe each tap, for stages that classify taps. Port ``features``.
     detections : Detections
         Rows so far; may hold rows of earlier frames behind a stage that delays them. Port ``detections``.
     """
@@ -50,6 +52,7 @@ class Block:
     aligned: AlignedProfile | None = None
     window_mean: WindowProfile | None = None
     window_sd: WindowProfile | None = None
+    features: FloatArray | None = None
     detections: Detections = field(default_factory=Detections.empty)
 
     def replace(self, **parts: Any) -> Block:
@@ -70,7 +73,7 @@ class Block:
         return self.detections.frame - self.frames.first
 
     def part(self, name: str) -> FloatArray:
-        """``first_path``, ``noise_rms`` or ``profile``, known to be there.
+        """``first_path``, ``noise_rms``, ``profile`` or ``features``, known to be there.
 
         Raises
         ------

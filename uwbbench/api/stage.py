@@ -52,7 +52,7 @@ class Stage(Generic[P]):
         Ports that an earlier stage must have produced.
     produces : frozenset of str
         Ports that later stages may use: ``first_path``, ``noise``, ``profile``, ``aligned``, ``window_mean``,
-        ``window_sd``, ``detections``, or the name of a column of detections.
+        ``window_sd``, ``features``, ``detections``, or the name of a column of detections.
     removes : frozenset of str
         Ports that are gone behind this stage, for example ``frames`` where detections are held back.
     needs : frozenset of str

@@ -8,8 +8,6 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from uwbbench.api import registry
 from uwbbench.api.block import Block
 from uwbbench.api.capture import Capture, CaptureHeader
@@ -96,7 +94,7 @@ class Pipeline:
         capture : Capture or CaptureHeader
             Gives the radar; its samples are not touched. A header has no background.
         audit : bool
-            Keep what the filters drop, in ``stream.rejected``.
+            Keep what the filters drop, for ``stream.candidates``.
         fused : bool
             Let kernels take over the runs of stages that they know. They find the same; an audit goes without.
         threads : int
@@ -223,7 +221,7 @@ class Pipeline:
         if handed_out:
             detections = with_hand_outs(self, capture, detections, threads)
         if candidates:
-            return detections.annotated(candidates=_candidates(detections, stream.rejected), chain=stream.chain)
+            return detections.annotated(candidates=stream.candidates(detections), chain=stream.chain)
 
         @cache
         def audited() -> Detections:
@@ -298,13 +296,6 @@ def _makers_of(port: str) -> list[str]:
 
 def _known(candidates: Detections | None) -> Detections:
     return Detections.empty() if candidates is None else candidates
-
-
-def _candidates(detections: Detections, rejected: Detections) -> Detections:
-    """Peaks before the filters, with ``retained`` 1 for those that passed them all, else ``rejected_by``."""
-    kept = detections.with_columns(retained=np.ones(len(detections)), rejected_by=np.full(len(detections), np.nan))
-    dropped = rejected.with_columns(retained=np.zeros(len(rejected)))
-    return Detections.join([kept, dropped])
 
 
 def _fused(steps: list[Opened], notes: list[str], threads: int) -> list[Opened]:

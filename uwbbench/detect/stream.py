@@ -49,6 +49,7 @@ class Stream:
         self._preface = tuple(notes)
         self._audit = audit
         self._rejected: list[Detections] = []
+        self._tracks = any("track" in stage.produces for stage in self.stages)
         self._kernel = steps[0].stage if steps and isinstance(steps[0].stage, Kernel) else None
         self._counts = not any(isinstance(step.stage, Kernel) for step in steps)
         self._noted: tuple[int, tuple[str, ...]] = (-1, ())
@@ -112,13 +113,21 @@ class Stream:
             self._noted = count, tuple(dict.fromkeys(notes))
         return self._noted[1]
 
-    @property
-    def rejected(self) -> Detections:
-        """Detections that filters dropped, kept only in an audit.
+    def candidates(self, detections: Detections) -> Detections:
+        """Peaks before the filters, with ``retained`` 1 for those that passed them all, else ``rejected_by``.
 
-        ``rejected_by`` is the place of the filter in ``chain``.
+        ``rejected_by`` is the place of the filter in ``chain``. A track is no peak: of a detector that makes tracks,
+        those that passed are the detections that the tracks were made of.
+
+        Parameters
+        ----------
+        detections : Detections
+            All that the stream has handed out, in an audit.
         """
-        return Detections.join(self._rejected)
+        own = detections.take(np.zeros(0, np.int64)) if self._tracks else detections
+        kept = own.with_columns(retained=np.ones(len(own)), rejected_by=np.full(len(own), np.nan))
+        every = Detections.join([kept, *self._rejected])
+        return every.with_columns(retained=np.isnan(every["rejected_by"]))
 
     def tails(self) -> Iterator[Block]:
         """What stages still hold back, each taken through the steps behind it."""
@@ -145,6 +154,9 @@ class Stream:
                 rejected.append(block.replace(detections=dropped.with_columns(rejected_by=place)))
                 block = block.replace(detections=block.detections.take(keep))
             else:
+                if self._audit and "track" in stage.produces:
+                    passed = block.detections.with_columns(rejected_by=np.full(len(block.detections), np.nan))
+                    rejected.append(block.replace(detections=passed))
                 if stage.rowwise:
                     rejected = [stage.step(part) for part in rejected]
                 block = stage.step(block)

@@ -91,8 +91,8 @@ class EntropySegments(Stage[EntropyParams]):
 
     References
     ----------
-    A. Mimouna et al., "Entropy-based Ultra-Wide Band radar signals segmentation for multi obstacle detection", IEEE
-    Sensors Journal, 2021; O. Vasicek, J. Royal Statistical Society B 38(1), 1976 (estimator).
+    A. Mimouna et al., "Entropy-based Ultra-Wide Band radar signals segmentation for multi obstacle detection",
+    2021; O. Vasicek, J. Royal Statistical Society B 38(1), 1976 (estimator).
     """
 
     consumes: ClassVar[frozenset[str]] = ports("frames", "first_path")

@@ -16,9 +16,7 @@ def sentences(content: Content) -> Iterator[str]:
     """One sentence for each dataset: who leads, how sure that is, and at what cost."""
     for about, estimates in content.estimates:
         key = about["dataset"], about["source"]
-        if content.leaders.get(key) != about["detector"] or about["table"] != "filtering":
-            continue
-        if about["scoring"] == next(board[2] for board in content.boards if board[:2] == key):
+        if content.leads(about) and content.leaders[key] == about["detector"]:
             yield _sentence(content, about, estimates)
 
 

@@ -86,16 +86,17 @@ class Content:
     def leaders(self) -> dict[tuple[str, str], str]:
         """First detector of each dataset and source, on its first board."""
         leaders: dict[tuple[str, str], str] = {}
-        order = self.report.experiment["scoring"]
-        first: dict[str, int] = {}  # scoring of each dataset that comes first among those of the run
         for about, _ in self.estimates:
-            place = order.index(about["scoring"]) if about["scoring"] in order else len(order)
-            first[about["dataset"]] = min(place, first.get(about["dataset"], place))
-        for about, _ in self.estimates:
-            place = order.index(about["scoring"]) if about["scoring"] in order else len(order)
-            if about["table"] == "filtering" and place == first[about["dataset"]]:
+            if self.leads(about):
                 leaders.setdefault((about["dataset"], about["source"]), about["detector"])
         return leaders
+
+    def leads(self, about: Mapping[str, Any]) -> bool:
+        """Whether a row is of its dataset's first board: of the experiment's first scoring that there is."""
+        asked = self.report.experiment["scoring"]
+        there = {board[2] for board in self.boards if board[0] == about["dataset"]}
+        first = min(there, key=lambda scoring: (asked.index(scoring) if scoring in asked else len(asked), scoring))
+        return bool(about["table"] == "filtering" and about["scoring"] == first)
 
     @cached_property
     def marks(self) -> dict[str, Look]:

@@ -15,7 +15,7 @@ from uwbbench.show.page.limits_section import limits
 from uwbbench.show.page.section import Section
 from uwbbench.show.text.report import Tables
 from uwbbench.show.text.sheet import sentence, shown
-from uwbbench.show.text.wording import set_aside_warning
+from uwbbench.show.text.wording import TRACK_ERRORS, set_aside_warning
 
 if TYPE_CHECKING:
     from uwbbench.show.page.content import Content
@@ -60,13 +60,14 @@ def leaderboard(content: Content) -> Section | None:
     if not content.boards:
         return None
     confidence = f"{content.report.experiment['intervals']['confidence']:.0%}"
-    notes: tuple[str, ...] = (
+    note = (
         f"Value, and below it its {confidence} interval. {INTERVALS} Errors are those of all retained detections; "
         "\u201cof matches\u201d counts true positives only: read it with recall. n/a: undefined. Times of a frame are "
-        f"{content.report.timed}; absolute ones hold on one machine only, the ratio travels.",
+        f"{content.report.timed}; absolute ones hold on one machine only, the ratio travels."
     )
-    notes += (BOUNDS,) if content.report.bounds else ()
-    return Section("leaderboard", "Leaderboard", layout="leaderboard", notes=notes)
+    tracks = [TRACK_ERRORS] if any(board[2] == "track" for board in content.boards) else []
+    bounds = [BOUNDS] if content.report.bounds else []
+    return Section("leaderboard", "Leaderboard", layout="leaderboard", notes=(note, *tracks, *bounds))
 
 
 def pareto(content: Content) -> Section | None:
@@ -82,6 +83,12 @@ def pareto(content: Content) -> Section | None:
         "not drawn."
     )
     return Section("pareto", "Speed against error", of_board=("pareto",), notes=(note,))
+
+
+def classes(content: Content) -> Section | None:
+    """Which classes were taken for which."""
+    sheets = tuple(Tables(content.report).classes())
+    return Section("classes", "Classes", sheets=sheets) if sheets else None
 
 
 def by_range(content: Content) -> Section | None:
@@ -147,6 +154,7 @@ SECTIONS: tuple[Writer, ...] = (
     paper_first,
     leaderboard,
     reported,
+    classes,
     pareto,
     by_range,
     errors,

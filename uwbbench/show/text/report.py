@@ -14,6 +14,7 @@ from uwbbench.results.report import Report
 from uwbbench.results.times import ROWS
 from uwbbench.results.verdicts import BOUNDS, WITHIN, rank_text
 from uwbbench.show.text.captures_sheets import captures_sheet, each_capture_sheet
+from uwbbench.show.text.class_sheets import class_sheets
 from uwbbench.show.text.error_sheets import cause_sheets, curve_sheets, main_causes
 from uwbbench.show.text.limits_sheets import limits_sheets
 from uwbbench.show.text.numbers import between, interval, number, time_us
@@ -21,7 +22,7 @@ from uwbbench.show.text.paper_sheets import paper_sheets, published_sheets
 from uwbbench.show.text.quantity import Quantity, undefined_titles
 from uwbbench.show.text.reported_sheets import reported_sheets
 from uwbbench.show.text.sheet import Sheet, escaped, sentence, shown
-from uwbbench.show.text.wording import TABLES, set_aside_warning
+from uwbbench.show.text.wording import ERRORS, TABLES, TRACK_ERRORS, set_aside_warning
 
 
 def sheets(report: Report) -> list[Sheet]:
@@ -32,6 +33,7 @@ def sheets(report: Report) -> list[Sheet]:
         tables.limits,
         tables.leaderboards,
         tables.reported,
+        tables.classes,
         tables.causes,
         tables.curves,
         tables.paper,
@@ -61,6 +63,10 @@ class Tables:
     def reported(self) -> Iterator[Sheet]:
         """What sources report of their methods, where any detector here is after one that does."""
         return self._labelled(reported_sheets(self._report))
+
+    def classes(self) -> Iterator[Sheet]:
+        """Which classes were taken for which, where detectors tell classes apart."""
+        return self._labelled(class_sheets(self._report))
 
     def leaderboards(self) -> Iterator[Sheet]:
         """One for each dataset, scoring and table; test signals have tables of their own, and no leader."""
@@ -188,12 +194,14 @@ def _leaderboards(report: Report, rows_of: Sequence[tuple[dict[str, Any], Any]])
 
 def _own_region(report: Report, dataset: str) -> str:
     """Where the captures of a dataset are scored, if not where all others are; else empty."""
-    region = dict(report.folder.rules[0].regions).get(dataset)
+    rule = report.folder.rules[0]
+    region, gate_m = dict(rule.regions).get(dataset), dict(rule.gates).get(dataset)
+    gate = "" if gate_m is None else f"with a gate of {gate_m:g} m"
     if region is None:
-        return ""
+        return gate
     to = "" if region.max_range_m is None else f" to {region.max_range_m:g} m"
     angle = "" if region.half_angle_rad is None else f", up to {math.degrees(region.half_angle_rad):g} degrees aside"
-    return f"from {region.min_range_m:g} m{to}{angle}"
+    return f"from {region.min_range_m:g} m{to}{angle} {gate}".rstrip()
 
 
 def _leaderboard_notes(
@@ -201,7 +209,7 @@ def _leaderboard_notes(
 ) -> Iterator[str]:
     open_world = any(not about["exhaustive"] for about, _ in members)
     main = quantities[metrics.ranking(exhaustive=not open_world)]
-    yield "Errors are those of all retained detections; 'of matches' counts true positives only: read it with recall."
+    yield TRACK_ERRORS if members[0][0]["scoring"] == "track" else ERRORS
     if metrics.listed:
         yield f"Ranked by {main.title}."
     if any(about["bound"] for about, _ in members):

@@ -12,6 +12,11 @@ TABLES = {"filtering": "after filtering (range)", "mapping": "after mapping (pos
 """Names of the paper's two tables."""
 
 
+ERRORS = "Errors are those of all retained detections; 'of matches' counts true positives only: read it with recall."
+TRACK_ERRORS = "Errors of tracks are those where a track is matched with an object: read them with recall."
+"""What the errors of a scoring are of."""
+
+
 def set_aside_warning(one: SetAside) -> str:
     """What a reader must know of a detector most of whose detections its scoring did not look at."""
     text = (

@@ -43,7 +43,7 @@ def _survives(subject: StageSubject, capture: Capture) -> Values:
         yielded = subject.run(block, (1, 7), stage)
     for name in subject.adds & yielded.keys():
         values = yielded[name]
-        wrong = ~np.isfinite(values) if name in ("frames", "noise", "profile") else np.isinf(values)
+        wrong = ~np.isfinite(values) if name in ("frames", "noise", "profile", "features") else np.isinf(values)
         if wrong.any():
             raise Nonconformity(f"finite values of {name}", f"{int(wrong.sum())} of {values.size} are not")
     return yielded

@@ -32,6 +32,7 @@ PARTS = {
     "aligned": "aligned",
     "window_mean": "window_mean",
     "window_sd": "window_sd",
+    "features": "features",
 }
 """Attribute of a block behind each port that is one."""
 

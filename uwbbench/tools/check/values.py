@@ -32,6 +32,7 @@ def of_blocks(blocks: Iterable[Block]) -> Values:
             "aligned": None if block.aligned is None else block.aligned.magnitude,
             "window_mean": None if block.window_mean is None else block.window_mean.of_frames,
             "window_sd": None if block.window_sd is None else block.window_sd.of_frames,
+            "features": block.features,
         }
         for name, array in held.items():
             if array is not None:

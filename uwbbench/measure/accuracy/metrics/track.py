@@ -207,7 +207,7 @@ class TrackUnbiasedRmse(TrackRmse):
 class IdentitySwitches(_Rate):
     """How often another track takes over an object, for each object (CLEAR-MOT)."""
 
-    title: ClassVar[str] = "identity switches"
+    title: ClassVar[str] = "ID switches"
     unit: ClassVar[str] = "1/object"
     margin: ClassVar[float] = 0.1
     brief: ClassVar[bool] = True

@@ -1,0 +1,1 @@
+"""Responses taken apart by wavelets."""
