@@ -124,7 +124,6 @@ class Classifier(Stage[C]):
         present, answer = label > 0, found[:, 0] <= 0.5
         rates = [np.mean(answer[side] == present[side]) for side in (present, ~present) if side.any()]
         return {
-            "frames": float(len(label)),
             "accuracy": float(np.mean(found.argmax(axis=1) == label)),
             "presence": float(np.mean(rates)),
         }

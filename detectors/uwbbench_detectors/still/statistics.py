@@ -42,7 +42,7 @@ class StatisticParams(Params):
         5.0,
         gt=0,
         description="Length of a window. Windows follow each other without overlap; the last one of a capture may be "
-        "shorter, down to a half.",
+        "shorter, down to a half; fewer frames get no answer.",
     )
     first_path_taps: float = Field(
         10.0, gt=0, description="Frames whose first path is farther from the median of the window are left out."
@@ -92,6 +92,7 @@ class Statistic(Stage[StatisticParams]):
             )
         self._held: list[Block] = []
         self._count = 0
+        self._any_full = False
 
     def step(self, block: Block) -> Block:
         """Block with the frames of the windows that are full."""
@@ -100,6 +101,7 @@ class Statistic(Stage[StatisticParams]):
         full = self._count - self._count % self._length
         if not full:
             return self._with_windows(block.cut(0, 0))
+        self._any_full = True
         joined = Block.join(self._held)
         self._held, self._count = [joined.cut(full, self._count)], self._count - full
         return self._with_windows(joined.cut(0, full))
@@ -127,6 +129,8 @@ class Statistic(Stage[StatisticParams]):
         for start in starts:
             stop = min(start + self._length, frames)
             window = self._window(block.cut(start, stop))
+            if window is None:
+                continue
             if isinstance(window, str):
                 refused.append(window)
                 self.note(f"{self.name}: {window}")
@@ -145,12 +149,14 @@ class Statistic(Stage[StatisticParams]):
         }
         return block.replace(**self.parts(profiles))
 
-    def _window(self, block: Block) -> tuple[BoolArray, tuple[FloatArray, FloatArray, IntArray]] | str:
-        """Frames that one window is made of, with mean, standard deviation and count (bins,); or why there are none."""
+    def _window(self, block: Block) -> tuple[BoolArray, tuple[FloatArray, FloatArray, IntArray]] | str | None:
+        """Frames that one window is made of, with mean, standard deviation and count (bins,); or why not."""
         p, aligned, frames = self.params, block.aligned_profile, len(block.frames)
         if frames < LEAST_SHARE * self._length:
+            if self._any_full:  # what is left of a capture at its end
+                return None
             return (
-                f"no answer for the last frames of the capture, less than half a window of {p.window_s:g} s; use a "
+                f"no answer for a capture of {frames} frames, less than half a window of {p.window_s:g} s; use a "
                 "longer capture or a shorter window_s"
             )
         if self._moves(block.frames):

@@ -10,8 +10,8 @@ Conventions
 
   1. ``shared``: a detection is near, but belongs to another obstacle.
   2. ``not the strongest``: one is near, but the scoring looks at stronger ones of that frame alone.
-  3. ``not in a cluster``: one is near, but in no cluster (mapping only); ``not in a track``: in no confirmed track
-     (``track`` only).
+  3. ``not in a cluster``: one is near, but in no cluster (mapping only); ``not in a track``: one is near, or a
+     candidate that passed all filters, but no confirmed track (``track`` only).
   4. ``lost behind the filters``: a candidate that passed all filters is near, but did not come out.
   5. ``dropped by STEP``: candidates are near, and this filter dropped the one that came furthest.
   6. ``outside the window``: no candidate is near, and the echo comes after the last tap.
@@ -156,7 +156,8 @@ def _ranks(detections: Detections, scene: Scene, rules: ScoringRules, table: Tab
     if candidates is not None:
         rank[:] = _without_candidate(scene)
         near = _near(candidates, scene, rules, table)
-        place = np.nan_to_num(candidates["rejected_by"], nan=float(_BEHIND - len(_EARLY))).astype(np.int64)
+        passed = _late("not in a track" if rules.scoring == "track" else "lost behind the filters")
+        place = np.nan_to_num(candidates["rejected_by"], nan=float(passed - len(_EARLY))).astype(np.int64)
         _raise(rank, candidates.frame, near, place + len(_EARLY))
     needed, without = ("track", "not in a track") if rules.scoring == "track" else ("cluster", "not in a cluster")
     _raise(rank, detections.frame, _near(detections, scene, rules, table), _late(without))

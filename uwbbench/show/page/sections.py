@@ -60,14 +60,14 @@ def leaderboard(content: Content) -> Section | None:
     if not content.boards:
         return None
     confidence = f"{content.report.experiment['intervals']['confidence']:.0%}"
-    notes = [
+    note = (
         f"Value, and below it its {confidence} interval. {INTERVALS} Errors are those of all retained detections; "
         "\u201cof matches\u201d counts true positives only: read it with recall. n/a: undefined. Times of a frame are "
         f"{content.report.timed}; absolute ones hold on one machine only, the ratio travels."
-    ]
-    notes += [TRACK_ERRORS] if any(board[2] == "track" for board in content.boards) else []
-    notes += [BOUNDS] if content.report.bounds else []
-    return Section("leaderboard", "Leaderboard", layout="leaderboard", notes=tuple(notes))
+    )
+    tracks = [TRACK_ERRORS] if any(board[2] == "track" for board in content.boards) else []
+    bounds = [BOUNDS] if content.report.bounds else []
+    return Section("leaderboard", "Leaderboard", layout="leaderboard", notes=(note, *tracks, *bounds))
 
 
 def pareto(content: Content) -> Section | None:

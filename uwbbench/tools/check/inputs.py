@@ -41,7 +41,13 @@ def call_s(step: Callable[[Any], object], calls: Sequence[Any]) -> float:
 
 @cache
 def usual_capture(*, sts: bool = True, truth: bool = True, background: bool = True) -> Capture:
-    """Approach to one echo in complex64 samples, with invalid, zero and very strong frames, and a background."""
+    """Approach to one echo in complex64 samples, with invalid, zero and very strong frames.
+
+    Parameters
+    ----------
+    sts, truth, background : bool
+        Whether it has STS responses, a ground truth and a background, some frames of which are invalid too.
+    """
 
     def partly_invalid(samples: np.ndarray) -> np.ndarray:
         samples[INVALID, 3] = np.nan

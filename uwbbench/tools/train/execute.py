@@ -56,7 +56,7 @@ class Score:
     ----------
     on : str
         Role and dataset, for people.
-    captures, units : int
+    captures, units, frames : int
     figures : mapping of str to float
         By the stage's own measures; empty where it has none.
     """
@@ -64,6 +64,7 @@ class Score:
     on: str
     captures: int
     units: int
+    frames: int
     figures: Mapping[str, float]
 
 
@@ -248,7 +249,8 @@ def _score(training: Training, weights: Weights, on: str, side: Sequence[Prepare
     stage.load(weights)
     stage.open(side[0].labelled.capture.radar)
     figures = stage.assess([one.example for one in side]) if isinstance(stage, Assessed) else {}
-    return Score(on, len(side), len({one.unit for one in side}), figures)
+    frames = sum(len(one.example.block.frames) for one in side)
+    return Score(on, len(side), len({one.unit for one in side}), frames, figures)
 
 
 def _folds(

@@ -72,7 +72,7 @@ def to_dict(trained: Trained) -> dict[str, Any]:
                 "seed": training.model.seed,
                 "versions": trained.about.versions,
                 "scores": [
-                    {"on": one.on, "captures": one.captures, "units": one.units, **one.figures}
+                    {"on": one.on, "captures": one.captures, "units": one.units, "frames": one.frames, **one.figures}
                     for one in trained.scores
                 ],
             }
@@ -90,6 +90,7 @@ def sheets(trained: Trained) -> list[Sheet]:
             shown(one.on),
             str(one.captures),
             str(one.units),
+            str(one.frames),
             *(number(one.figures.get(name, math.nan), 3) for name in names),
         )
         for one in trained.scores
@@ -98,7 +99,7 @@ def sheets(trained: Trained) -> list[Sheet]:
     return [
         Sheet(
             f"{training.step.use} of {training.detector.name} trained by '{training.name}'{mark}",
-            ("captures", "count", f"{by}s", *names),
+            ("captures", "count", f"{by}s", "frames", *names),
             rows,
             (
                 f"split by {by}: none is on two sides; {split}; what is held out neither trained nor chose",

@@ -89,3 +89,27 @@ def test_experiments_that_agree_keep_their_choice_and_others_show_what_any_of_th
     assert both.listed == ("sd", "mae", "bias")
     assert both.defined(exhaustive=True) == [*DEFAULT[:8], "bias", "matched_mae"]
     assert names_of([]) == names_of({}) == []
+
+
+def test_a_scoring_has_the_metrics_that_take_its_outcomes_and_ranks_by_its_own():
+    every = MetricChoice((), ["frame", "track"])
+    assert list(every.of("frame")) == DEFAULT
+    assert set(DEFAULT) < set(every.of("track"))
+    assert every.of("track").ranking(exhaustive=True) == "gospa"
+    assert every.of("track").ranking(exhaustive=False) == "recall"
+    assert every.of("track").error(exhaustive=True) == ["track_rmse"]
+    assert "gospa" not in MetricChoice((), ["frame"])
+
+
+def test_a_listed_metric_is_passed_over_where_it_has_no_meaning():
+    metrics = MetricChoice({"rank": "ospa", "table": ["ospa", "bias"], "charts": ["ospa"]}, ["object", "track"])
+    assert metrics.of("track").defined(exhaustive=True) == ["ospa", "bias"]
+    assert metrics.of("object").ranking(exhaustive=True) == "f1"
+    assert metrics.of("object").defined(exhaustive=True) == ["f1", "bias"]
+    assert metrics.of("object").headline(exhaustive=True) == ["f1", "recall", "mae", "p95"]
+
+
+def test_narrow_tables_of_a_scoring_with_metrics_of_its_own_leave_out_those_that_are_no_headline():
+    brief = MetricChoice((), ["track"]).brief
+    assert {"gospa", "track_rmse", "f1"} < set(brief)
+    assert not {"precision", "p90", "sd", "gospa_missed"} & set(brief)
