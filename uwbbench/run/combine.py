@@ -21,7 +21,7 @@ SHARED: Mapping[str, Any] = {"strongest": None, "surface": "outline"}
 def combined(data: dict[str, Any], source: YamlFile, path: Path, anchor: Anchor) -> dict[str, Any]:
     """Values of an experiment with those of the experiments that it names put in; any other as it is.
 
-    Datasets keep the detectors, scorings, region and gate of their experiment, and are not timed where it times nothing.
+    Datasets keep the detectors, scorings, region and gate of their experiment, and are timed where it times anything.
 
     Parameters
     ----------
