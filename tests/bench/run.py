@@ -19,6 +19,7 @@ PARTS = {
     "cfar": "bench_cfar_clutter",
     "tracks": "bench_tracks",
     "sweep": "bench_sweep",
+    "classify": "bench_classify",
     "startup": "bench_startup",
     "gate": "gates",
 }

@@ -178,7 +178,18 @@ def neighbour_probabilities(
 
 @compiled
 def linear_probabilities(features: FloatArray, slope: FloatArray, intercept: FloatArray) -> FloatArray:
-    """Softmax (frames, classes) of a linear model of features (frames, features): slope (classes, features)."""
+    """Softmax of a linear model of features.
+
+    Parameters
+    ----------
+    features : (frames, features) array
+    slope : (classes, features) array
+    intercept : (classes,) array
+
+    Returns
+    -------
+    (frames, classes) array
+    """
     frames, classes = len(features), len(intercept)
     found = np.empty((frames, classes))
     for frame in range(frames):

@@ -5,7 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from uwbbench.api import CaptureError, ConfigError, PluginError
+import uwbbench
+from uwbbench.api import CaptureError, ConfigError, PluginError, leaks
 from uwbbench.api.locate import shipped
 from uwbbench.api.registry import load_plugin
 from uwbbench_datasets.simulator.dataset import Simulated, SimulatedParams
@@ -175,3 +176,39 @@ def test_the_seed_of_the_dataset_gives_every_scene_and_variant_other_draws(write
     first, second = places(None)
     assert first == second  # the seed of the scene: the same for both variants
     assert len({*places(1), *places(2)}) == 4
+
+
+PLACES = """
+schema: 1
+seed: 3
+runs: 2
+trajectory: {kind: straight, start_m: [0, 0], end_m: [0.2, 0], speed_m_s: 1}
+objects: [{id: target, shape: point, center_m: [2, 0]}, {id: left, shape: wall, center_m: [1, 2], width_m: 4}]
+vary: {objects.target: [null, {id: box, shape: point, center_m: [2, 0]}]}
+draw: {objects.left.center_m.1: [1, 3]}
+terms: [{use: direct}, {use: noise}]
+"""
+
+
+def captures_of_places(tmp_path, draw_seed: str, **params):
+    path = tmp_path / "places.yaml"
+    path.write_text(f"{PLACES}draw_seed: {draw_seed}\n")
+    dataset = uwbbench.open_dataset("simulated", {"scenes": [str(path)], **params})
+    return [dataset.open(name) for name in dataset.names()]
+
+
+@pytest.mark.parametrize("params", [{}, {"seed": 9}])
+def test_variants_with_a_draw_seed_share_their_places_and_no_noise(tmp_path, params):
+    nothing, _, box, other = captures_of_places(tmp_path, "5", **params)
+    walls = [one.truth.objects[-1].outline_m.tolist() for one in (nothing, box, other)]
+    assert walls[0] == walls[1] != walls[2]
+    assert nothing.name == "places/target-None/1"
+    assert [item.name for item in box.truth.objects] == ["box", "left"]
+    assert [item.name for item in nothing.truth.objects] == ["left"]
+    assert not leaks(nothing.recording, box.recording)
+    assert not np.any(nothing.preamble[:, :2] == box.preamble[:, :2])
+
+
+def test_without_a_draw_seed_variants_share_their_draws_and_leak(tmp_path):
+    nothing, _, box, _ = captures_of_places(tmp_path, "null")
+    assert leaks(nothing.recording, box.recording)

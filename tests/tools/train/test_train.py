@@ -6,7 +6,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from uwbbench.api import ConfigError, Example
+from uwbbench.api import ConfigError
+from uwbbench.api.arrays import locked
 from uwbbench.api.weights import load_weights
 from uwbbench.detect.pipeline import detector_from_yaml, load_detector
 from uwbbench.tools.train import publish, read_training, train
@@ -40,10 +41,9 @@ def file(**changes: Any) -> dict[str, Any]:
 
 
 @pytest.mark.slow
-def test_the_same_seed_gives_the_same_bytes_and_another_one_others():
-    first, again, other = (train(read_training(file(seed=seed))) for seed in (5, 5, 6))
+def test_the_same_seed_gives_the_same_bytes():
+    first, again = (train(read_training(file())) for _ in range(2))
     assert first.content == again.content
-    assert first.sha256 != other.sha256
 
 
 @pytest.mark.slow
@@ -79,40 +79,46 @@ def test_each_fold_is_tried_on_rooms_that_its_weights_have_not_seen():
 
 
 @pytest.fixture(scope="module")
-def examples() -> dict[str, list[Example]]:
-    """Captures of six rooms behind the steps before the trees: of four, and of the other two."""
-    training = read_training(
-        file(training=[use(1, 2, 3, 4, scene="coupling-indoor")], held_out=[use(5, 6, scene="coupling-indoor")])
-    )
-    captures = _captures(training, lambda _: None)
-    prepared = [_prepared(training, captures, place, lambda _: None) for place in range(len(captures))]
-    return {role: [one.example for one in prepared if one.role == role] for role in ("training", "held out")}
+def rooms() -> tuple[Any, Any, Any]:
+    """Features of all frames of four places behind the steps before the trees, with their class and place."""
+    captures = {**use(1, 2, 3, 4), "params": {"scenes": ["coupling-outdoor"]}}
+    training = read_training(file(training=[captures]))
+    opened = _captures(training, lambda _: None)
+    stage = Trees(TreesParams(weights=None))
+    parts = []
+    for place in range(len(opened)):
+        one = _prepared(training, opened, place, lambda _: None)
+        features, label = stage.labelled([one.example])
+        parts.append((features, label, np.full(len(label), int(one.unit.rsplit("/", 1)[1]))))
+    features, label, room = (np.concatenate(values) for values in zip(*parts, strict=True))
+    return features, label, room
 
 
-def accuracy(stage: Trees, features: Any, label: Any, others: Any, true: Any) -> float:
-    stage.load(stage.learn(features, label, 1))
-    return float(np.mean(stage.probabilities(others).argmax(axis=1) == true))
+def accuracy(features: Any, label: Any, side: Any, true: Any) -> float:
+    """Share of right answers on each side after learning from all others, over all frames together."""
+    stage = Trees(TreesParams(weights=None, trees=20))
+    right = []
+    for one in np.unique(side):
+        weights = stage.learn(features[side != one], label[side != one], 1)
+        stage.load({name: locked(values) for name, values in weights.items()})
+        right.append(stage.probabilities(features[side == one]).argmax(axis=1) == true[side == one])
+    return float(np.concatenate(right).mean())
 
 
 @pytest.mark.slow
-def test_shuffled_labels_are_learned_at_chance(examples):
-    """Frames of a room are alike, so that 24 captures of two rooms count as few; chance is 1/3 within 0.12."""
-    stage = Trees(TreesParams(weights=None, trees=30))
-    features, label = stage.labelled(examples["training"])
-    others, true = stage.labelled(examples["held out"])
+def test_shuffled_labels_are_learned_at_chance(rooms):
+    """Of 1 506 frames 3 standard deviations of chance are 0.036; neighbouring frames are alike, hence twice that."""
+    features, label, room = rooms
     shuffled = np.random.default_rng(2).permutation(label)
-    assert accuracy(stage, features, label, others, true) > 0.7
-    assert abs(accuracy(stage, features, shuffled, others, true) - 1 / 3) < 0.12
+    assert abs(accuracy(features, shuffled, room, label) - 1 / 3) < 0.075
 
 
 @pytest.mark.slow
-def test_a_split_by_frames_would_promise_more_than_rooms_that_were_not_seen_give(examples):
-    stage = Trees(TreesParams(weights=None, trees=30))
-    features, label = stage.labelled(examples["training"])
-    others, true = stage.labelled(examples["held out"])
-    odd = np.arange(len(label)) % 2 == 1
-    by_frames = accuracy(stage, features[~odd], label[~odd], features[odd], label[odd])
-    assert by_frames > accuracy(stage, features, label, others, true) + 0.03
+def test_a_split_by_frames_would_promise_more_than_places_that_were_not_seen_give(rooms):
+    features, label, room = rooms
+    by_room = accuracy(features, label, room, label)
+    by_frames = accuracy(features, label, np.arange(len(label)) % 4, label)
+    assert by_frames > by_room + 0.02 > 0.85
 
 
 @pytest.mark.parametrize(
