@@ -79,17 +79,17 @@ def table() -> None:
         for detector in detectors:
             errors_m = np.array([_error_m(detector, capture) for capture in captures])
             known = np.isfinite(errors_m)
-            mean = f"{100 * np.abs(errors_m[known]).mean():.1f}" if known.any() else "none"
+            mean = f"{100 * errors_m[known].mean():.1f}" if known.any() else "none"
             empty = dataset.label.startswith("background")
             cells.append(f"{known.sum()} of {len(known)}" if empty else f"{mean} ({known.sum()})")
         sys.stdout.write(f"| {dataset.label} | {' | '.join(cells)} |\n")
 
 
 def _error_m(detector: Pipeline, capture: Capture) -> float:
-    """Mean error of the answers about a capture; NaN without any."""
+    """Mean absolute error of the answers about a capture; NaN without any."""
     found = detector.run(capture)
     found = found.take(np.isfinite(found.range_m))
-    return float(np.mean(found.range_m - _true_m(capture)[found.frame])) if len(found) else np.nan
+    return float(np.mean(np.abs(found.range_m - _true_m(capture)[found.frame]))) if len(found) else np.nan
 
 
 if __name__ == "__main__":
