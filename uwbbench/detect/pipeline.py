@@ -218,7 +218,7 @@ class Pipeline:
         if not len(detections):  # an empty table has the columns that a full one would have
             classes = sorted(name for name in stream.ports if name.startswith("class_probability_"))
             usual = [*(name for name in COLUMNS if name in stream.ports), *classes]
-            detections = detections.with_columns(**{name: () for name in usual})
+            detections = detections.with_columns(**dict.fromkeys(usual, ()))
         detections = detections.annotated(notes=stream.notes)
         if handed_out:
             detections = with_hand_outs(self, capture, detections, threads)
