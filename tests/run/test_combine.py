@@ -5,10 +5,12 @@ from pathlib import Path
 import pytest
 
 from uwbbench.api import ConfigError
+from uwbbench.measure.accuracy.rules import ScoringRules
 from uwbbench.results import Report
 from uwbbench.run import rescore, run_experiment
 from uwbbench.run.experiment import read_experiment
 from uwbbench.run.folder import RunFolder
+from uwbbench.run.folder.scored import rules_of
 
 PLATE = "{{use: approach, name: {name}, params: {{speed_m_s: 6.0, runs: 1}}, repeats: []}}"
 USUAL = "schema: 1\nlatency: false\nstability: false\n"
@@ -23,7 +25,7 @@ def part(folder: Path, name: str, detectors: str, scoring: str, more: str = "") 
 @pytest.fixture
 def both(tmp_path: Path) -> Path:
     part(tmp_path, "one", "[constant, 'null']", "[frame]", "region: {min_range_m: 0.8}\n")
-    part(tmp_path, "two", "['null']", "[object, frame]")
+    part(tmp_path, "two", "['null']", "[object, frame]", "gate_m: 0.3\n")
     (tmp_path / "both.yaml").write_text(f"{USUAL}experiments: [one.yaml, two.yaml]\n")
     return tmp_path / "both.yaml"
 
@@ -38,6 +40,10 @@ def test_datasets_keep_the_detectors_scorings_and_region_of_their_experiment(bot
     assert one.region is not None
     assert one.region.min_range_m == 0.8
     assert two.region is None
+    assert (one.gate_m, two.gate_m) == (None, 0.3)
+    frame, _ = rules_of(experiment.to_dict())
+    assert [frame.of(label).gate_m for label in ("one", "two")] == [0.2, 0.3]
+    assert ScoringRules.from_dict(frame.to_dict()) == frame
 
 
 def test_each_dataset_is_run_and_scored_as_in_its_own_experiment(both: Path, tmp_path: Path) -> None:
@@ -66,7 +72,7 @@ def test_each_dataset_is_run_and_scored_as_in_its_own_experiment(both: Path, tmp
         ("experiments: []", "expected a list of names"),
         ("experiments: [one.yaml, thre.yaml]", "both.yaml"),
         ("experiments: [one.yaml]\ndetectors: ['null']", "'detectors' comes from the experiments"),
-        ("experiments: [one.yaml]\ngate_m: 0.3", "'one.yaml' has gate_m 0.2, but 0.3 is to hold for all"),
+        ("experiments: [one.yaml]\nstrongest: 2", "'one.yaml' has strongest None, but 2 is to hold for all"),
         ("experiments: [both.yaml]", "itself made of experiments"),
     ],
 )

@@ -76,6 +76,8 @@ class DatasetSource:
         Parameters that are put over the written ones when a capture is opened, and are stored nowhere.
     region : RegionModel or None
         Where its captures are scored; None for the region of all.
+    gate_m : float or None
+        Largest error of a true detection on them; None for that of all.
     scoring : tuple of str
         How they are scored; empty for all scorings.
     detectors : tuple of str
@@ -93,6 +95,7 @@ class DatasetSource:
     timed: bool = True
     secret: dict[str, Any] = field(default_factory=dict, repr=False)
     region: RegionModel | None = None
+    gate_m: float | None = None
     scoring: tuple[str, ...] = ()
     detectors: tuple[str, ...] = ()
 
@@ -103,6 +106,7 @@ class DatasetSource:
         about |= {} if self.at_most is None else {"at_most": self.at_most}
         about |= {"optional": True} if self.optional else {}
         about |= {} if self.timed else {"latency": False}
+        about |= {} if self.gate_m is None else {"gate_m": self.gate_m}
         about |= {"scoring": self.scoring} if self.scoring else {}
         about |= {"detectors": self.detectors} if self.detectors else {}
         return about if self.region is None else {**about, "region": self.region.model_dump()}

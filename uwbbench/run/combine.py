@@ -14,14 +14,14 @@ from uwbbench.run.contenders import named_detectors
 
 KEY = "experiments"
 
-SHARED: Mapping[str, Any] = {"gate_m": 0.2, "strongest": None, "surface": "outline"}
+SHARED: Mapping[str, Any] = {"strongest": None, "surface": "outline"}
 """What all detections of a run are scored by, and its default: it must be the same in experiments that are combined."""
 
 
 def combined(data: dict[str, Any], source: YamlFile, path: Path, anchor: Anchor) -> dict[str, Any]:
     """Values of an experiment with those of the experiments that it names put in; any other as it is.
 
-    Datasets keep the detectors, scorings and region of their experiment.
+    Datasets keep the detectors, scorings, region and gate of their experiment, and are timed where it times anything.
 
     Parameters
     ----------
@@ -37,7 +37,7 @@ def combined(data: dict[str, Any], source: YamlFile, path: Path, anchor: Anchor)
     Raises
     ------
     ConfigError
-        If there is no such experiment, two of them are scored by different gates, or it also lists detectors or
+        If there is no such experiment, two of them are scored by different rules, or it also lists detectors or
         datasets of its own.
     """
     if KEY not in data:
@@ -69,9 +69,11 @@ def combined(data: dict[str, Any], source: YamlFile, path: Path, anchor: Anchor)
             scoring = part.get("scoring", ["frame", "object"])
             scoring = [scoring] if isinstance(scoring, str) else list(scoring)
             scorings += [one for one in scoring if one not in scorings]
-            region = {"region": part["region"]} if "region" in part else {}
-            usual = {"detectors": list(own), "scoring": scoring, **region}
-            datasets += [{**usual, **dataset} for dataset in part.get("datasets") or []]
+            places: dict[str, Any] = {key: part[key] for key in ("region", "gate_m") if key in part}
+            if part.get("latency") is False:
+                places["latency"] = False
+            usual: dict[str, Any] = {**places, "detectors": list(own), "scoring": scoring}
+            datasets += [usual | dataset for dataset in part.get("datasets") or []]
             metrics = part.get("metrics", [])
             if isinstance(metrics, list):
                 data["metrics"] = list(dict.fromkeys([*data.get("metrics", []), *metrics]))

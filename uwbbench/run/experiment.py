@@ -38,6 +38,9 @@ class ScoredDataset(DatasetUse):
     )
     optional: bool = Field(default=False, description="Skip it, with a note, where its files are not there.")
     latency: bool = Field(default=True, description="Time detectors on it, where the experiment times them at all.")
+    gate_m: float | None = Field(
+        default=None, gt=0, description="Largest error of a true detection here; the experiment's if left out."
+    )
     scoring: list[Scoring] | None = Field(
         default=None, min_length=1, description="How these captures are scored, of the experiment's; all if left out."
     )
@@ -64,7 +67,7 @@ class ExperimentModel(ConfigModel):
     experiments: list[str] | None = Field(
         default=None,
         description="Experiments (names or files) to run as one, in place of 'detectors' and 'datasets': each dataset "
-        "keeps the detectors, scorings and region of its experiment.",
+        "keeps the detectors, scorings, region and gate of its experiment.",
     )
     set: dict[str, Any] = Field(default_factory=dict, description="Values to change in the extended one, by path.")
     detectors: list[DetectorItem] = Field(
@@ -298,6 +301,7 @@ def _datasets(model: ExperimentModel, source: YamlFile, roots: list[str]) -> tup
             region=use.region,
             optional=use.optional,
             timed=use.latency,
+            gate_m=use.gate_m,
             scoring=tuple(use.scoring or ()),
             detectors=tuple(use.detectors or ()),
         )

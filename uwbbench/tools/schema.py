@@ -137,7 +137,8 @@ def _file_schema(
     required = file.pop("required")
     if "extends" not in model.model_fields:
         return {"$schema": DIALECT, **file, "required": required, "$defs": definitions}
-    inherits: Schema = {"if": {"required": ["extends"]}, "else": {"required": required}}
+    others: list[Schema] = [{"required": [key]} for key in ("extends", "experiments") if key in model.model_fields]
+    inherits: Schema = {"if": {"anyOf": others}, "else": {"required": required}}
     inherits["dependentRequired"] = {"set": ["extends"]}
     return {"$schema": DIALECT, **file, **inherits, "$defs": definitions}
 

@@ -156,8 +156,8 @@ class Statistic(Stage[StatisticParams]):
             if self._any_full:  # what is left of a capture at its end
                 return None
             return (
-                f"no answer for a capture of {frames} frames, less than half a window of {p.window_s:g} s; use a longer "
-                "capture or a shorter window_s"
+                f"no answer for a capture of {frames} frames, less than half a window of {p.window_s:g} s; use a "
+                "longer capture or a shorter window_s"
             )
         if self._moves(block.frames):
             return (

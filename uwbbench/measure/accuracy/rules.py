@@ -48,6 +48,8 @@ class ScoringRules:
         What the error of a position is the distance to: the outline, 0 inside, or what the receiver sees of it.
     regions : tuple of (str, Region)
         Datasets of a run, by label, that have a region of their own; see :meth:`of`.
+    gates : tuple of (str, float)
+        Datasets of a run, by label, that have a gate of their own.
     only : tuple of str or None
         Datasets of a run, by label, that are scored like this; None: all. See :func:`rules_on`.
 
@@ -63,11 +65,13 @@ class ScoringRules:
     strongest: int | None = None
     surface: Surface = "outline"
     regions: tuple[tuple[str, Region], ...] = ()
+    gates: tuple[tuple[str, float], ...] = ()
     only: tuple[str, ...] | None = None
 
     def of(self, dataset: str) -> ScoringRules:
         """Rules of the captures of one dataset of a run, by its label."""
-        return replace(self, region=dict(self.regions).get(dataset, self.region), regions=(), only=None)
+        region, gate_m = dict(self.regions).get(dataset, self.region), dict(self.gates).get(dataset, self.gate_m)
+        return replace(self, region=region, gate_m=gate_m, regions=(), gates=(), only=None)
 
     @property
     def one_to_one(self) -> bool:
@@ -76,9 +80,11 @@ class ScoringRules:
 
     def to_dict(self) -> dict[str, Any]:
         """Rules as plain values; what is of single datasets only where there is any, as earlier versions had none."""
-        facts = {name: value for name, value in asdict(self).items() if name not in ("regions", "only")}
+        facts = {name: value for name, value in asdict(self).items() if name not in ("regions", "gates", "only")}
         if self.regions:
             facts["regions"] = {label: asdict(region) for label, region in self.regions}
+        if self.gates:
+            facts["gates"] = dict(self.gates)
         return facts if self.only is None else {**facts, "only": list(self.only)}
 
     @classmethod
@@ -86,7 +92,9 @@ class ScoringRules:
         """Rules from plain values."""
         regions = tuple((label, Region(**region)) for label, region in facts.get("regions", {}).items())
         only = tuple(facts["only"]) if "only" in facts else None
-        return cls(**{**facts, "region": Region(**facts["region"]), "regions": regions, "only": only})
+        gates = tuple(facts.get("gates", {}).items())
+        own = {"region": Region(**facts["region"]), "regions": regions, "gates": gates, "only": only}
+        return cls(**{**facts, **own})
 
     def __post_init__(self) -> None:
         if self.surface not in get_args(Surface):

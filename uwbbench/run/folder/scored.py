@@ -45,6 +45,7 @@ def rules_of(experiment: Mapping[str, Any]) -> tuple[ScoringRules, ...]:
             experiment["strongest"],
             experiment.get("surface", "outline"),
             regions,
+            tuple((used["label"], used["gate_m"]) for used in datasets if "gate_m" in used),
             only(scoring),
         )
         for scoring in experiment["scoring"]

@@ -194,12 +194,14 @@ def _leaderboards(report: Report, rows_of: Sequence[tuple[dict[str, Any], Any]])
 
 def _own_region(report: Report, dataset: str) -> str:
     """Where the captures of a dataset are scored, if not where all others are; else empty."""
-    region = dict(report.folder.rules[0].regions).get(dataset)
+    rule = report.folder.rules[0]
+    region, gate_m = dict(rule.regions).get(dataset), dict(rule.gates).get(dataset)
+    gate = "" if gate_m is None else f"with a gate of {gate_m:g} m"
     if region is None:
-        return ""
+        return gate
     to = "" if region.max_range_m is None else f" to {region.max_range_m:g} m"
     angle = "" if region.half_angle_rad is None else f", up to {math.degrees(region.half_angle_rad):g} degrees aside"
-    return f"from {region.min_range_m:g} m{to}{angle}"
+    return f"from {region.min_range_m:g} m{to}{angle} {gate}".rstrip()
 
 
 def _leaderboard_notes(

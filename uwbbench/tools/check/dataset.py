@@ -257,7 +257,7 @@ def hash_is_stable(subject: DatasetSubject) -> str:
     return one[:12]
 
 
-@check("uwbbench.api.capture_file.write_capture")
+@check("uwbbench.api.capture_writing.write_capture")
 def capture_can_be_kept(subject: DatasetSubject) -> None:
     """The capture can be written to a file and read again, in the precision that files have."""
     with tempfile.TemporaryDirectory() as folder:
