@@ -36,6 +36,7 @@ def main(folder: Path) -> None:
     coupling.main(folder / "coupling.png")
     still_robot.main(folder / "still-robot.png")
     walk.main(folder)
+    subprocess.run([sys.executable, HERE / "segments.py"], check=True)  # noqa: S603 - our own
     names = ("radargram", "map", "stable-zone", "coupling", "still-robot", "walker-svd", "kalman-track")
     for name in (f"{name}.png" for name in names):
         shrink(folder / name, IMAGES / name)
