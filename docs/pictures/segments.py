@@ -17,7 +17,7 @@ mpl.use("Agg")
 from matplotlib import pyplot as plt
 
 IMAGES = Path(__file__).parents[1] / "images" / "systems"
-CAPTURE = "segments-rooms/channel-9_near-metal/33"
+CAPTURE = "segments-rooms/channel-9_near-metal_far-box/33"
 """A room that the shipped weights have not seen."""
 PICTURES = {"entropy": ("entropy",), "wavelet-lstm": ("dwt-lstm", "dwt-bilstm")}
 
