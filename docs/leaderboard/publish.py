@@ -76,7 +76,8 @@ def _checked(run: uwbbench.Run) -> int:
         block = _block(path.read_text(encoding="utf-8"))[1]
         if f"version {version}" not in block:
             problems.append(f"{path.name}: is of another version of {SUITE} than {version}")
-        problems += [f"{path.name}: lacks detector {name}" for name in shipped("detectors") if f"`{name}`" not in block]
+        names = [detector.name for detector in read_experiment(SUITE).detectors]
+        problems += [f"{path.name}: lacks detector {name}" for name in names if f"`{name}`" not in block]
     known = pd.read_csv(SCORES, keep_default_na=False).set_index(["detector", "dataset", "capture"])
     for row in _counts(run).itertuples(index=False):
         key = row.detector, row.dataset, row.capture

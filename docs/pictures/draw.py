@@ -9,6 +9,7 @@ from pathlib import Path
 
 import coupling
 import still_robot
+import walk
 from PIL import Image
 
 HERE = Path(__file__).parent
@@ -34,7 +35,10 @@ def main(folder: Path) -> None:
     shutil.copyfile(folder / "figures" / "pareto-1-frame-filtering-f1.svg", IMAGES / "speed-against-f1.svg")
     coupling.main(folder / "coupling.png")
     still_robot.main(folder / "still-robot.png")
-    for name in ("radargram.png", "map.png", "stable-zone.png", "coupling.png", "still-robot.png"):
+    walk.main(folder)
+    subprocess.run([sys.executable, HERE / "segments.py"], check=True)  # noqa: S603 - our own
+    names = ("radargram", "map", "stable-zone", "coupling", "still-robot", "walker-svd", "kalman-track")
+    for name in (f"{name}.png" for name in names):
         shrink(folder / name, IMAGES / name)
     (IMAGES / "examples").mkdir(exist_ok=True)
     for script in sorted((HERE.parents[1] / "examples").glob("*.py")):

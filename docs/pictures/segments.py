@@ -9,7 +9,7 @@ import matplotlib as mpl
 import numpy as np
 from draw import shrink
 
-from uwbbench.api import Block, Capture
+from uwbbench.api import Block, Capture, bistatic_range, direction
 from uwbbench.config.source import open_dataset
 from uwbbench.detect.pipeline import load_detector
 
@@ -47,10 +47,21 @@ def draw(axis: plt.Axes, detector: str, capture: Capture) -> None:
     found = pipeline.run(capture)
     radar = capture.radar
     tap = np.arange(radar.taps)
-    range_m = (tap - float(np.median(signal.part("first_path")))) * radar.sample_interval_s * 299_792_458 / 2
+    delay_s = (tap - float(np.median(signal.part("first_path")))) * radar.sample_interval_s
+    range_m = bistatic_range(radar.excess_m(delay_s), direction(np.zeros(len(tap))), radar.baseline_m)
+    behind = range_m > 0
     level_db = 20 * np.log10(signal.frames.amplitude + 1e-4)
     time_s = capture.trajectory.timestamp_s
-    axis.pcolormesh(time_s, range_m, level_db.T, cmap="Greys", vmin=-60, vmax=-10, shading="nearest", rasterized=True)
+    axis.pcolormesh(
+        time_s,
+        range_m[behind],
+        level_db.T[behind],
+        cmap="Greys",
+        vmin=-60,
+        vmax=-10,
+        shading="nearest",
+        rasterized=True,
+    )
     bars = time_s[found.frame], found["range_start_m"], found["range_stop_m"]
     axis.vlines(*bars, color="tab:orange", alpha=0.5, linewidth=2, label="segments")
     sight = capture.truth.seen_from(radar, capture.trajectory)

@@ -50,7 +50,7 @@ def _draw(axes: Any, detector: Pipeline, part: str, capture: Capture) -> None:
     for stage in stages[:place]:
         block = stage.step(block)
     windows, compared = block.windows(part), stages[place]
-    excess_m = capture.radar.excess_m((windows.bins.taps - compared.crest_tap) * capture.radar.sample_interval_s)
+    excess_m = capture.radar.excess_m((windows.bins.place - compared.crest_tap) * capture.radar.sample_interval_s)
     range_m = bistatic_range(excess_m, np.tile([1.0, 0.0, 0.0], (len(excess_m), 1)), capture.radar.baseline_m)
     quiet = compared.background.mean if part == "window_mean" else compared.background.sd
     axes.plot(range_m, 20 * np.log10(quiet), color=GREY, label="background")

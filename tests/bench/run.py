@@ -17,6 +17,7 @@ PARTS = {
     "file": "bench_file",
     "dbscan": "bench_dbscan",
     "cfar": "bench_cfar_clutter",
+    "tracks": "bench_tracks",
     "sweep": "bench_sweep",
     "classify": "bench_classify",
     "startup": "bench_startup",

@@ -28,7 +28,7 @@ class Bins:
     count: int
 
     @property
-    def taps(self) -> FloatArray:
+    def place(self) -> FloatArray:
         """Taps (bins,) from the first path to each bin."""
         return self.first_tap + np.arange(self.count) / self.per_tap
 

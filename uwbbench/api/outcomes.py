@@ -29,9 +29,9 @@ class TrackOutcome(Outcome):
     switches, fragmentations : (frames,) int array
         Objects that in this frame are followed by another track than before, and those that are followed again after
         they were visible but not followed.
-    object_frame : (objects,) int array
+    object_frame : (seen,) int array
         Row of the frame in which each object was visible for the first time.
-    delay_s : (objects,) array
+    delay_s : (seen,) array
         Time from then to its first confirmed track; NaN where it never had one.
     track_frame : (tracks,) int array
         Row of the first frame of each track.

@@ -122,7 +122,10 @@ class Stage(Generic[P]):
 
     @property
     def resolves_taps(self) -> float:
-        """Largest distance at which two equal echoes are not taken for noise by each other, by how the method works."""
+        """Largest distance at which two equal echoes are not taken for noise by each other, by how the method works.
+
+        Asked of an opened stage.
+        """
         return math.inf
 
     def recalibrated(self, column: str, offset: float) -> dict[str, float]:  # noqa: ARG002

@@ -216,7 +216,9 @@ class Pipeline:
         parts = [stream.step(frames) for frames in capture.blocks(BATCH_FRAMES, sts="sts" in stream.needs)]
         detections = Detections.join([*parts, stream.flush()])
         if not len(detections):  # an empty table has the columns that a full one would have
-            detections = detections.with_columns(**{name: () for name in COLUMNS if name in stream.ports})
+            classes = sorted(name for name in stream.ports if name.startswith("class_probability_"))
+            usual = [*(name for name in COLUMNS if name in stream.ports), *classes]
+            detections = detections.with_columns(**dict.fromkeys(usual, ()))
         detections = detections.annotated(notes=stream.notes)
         if handed_out:
             detections = with_hand_outs(self, capture, detections, threads)

@@ -21,7 +21,7 @@ SHARED: Mapping[str, Any] = {"strongest": None, "surface": "outline"}
 def combined(data: dict[str, Any], source: YamlFile, path: Path, anchor: Anchor) -> dict[str, Any]:
     """Values of an experiment with those of the experiments that it names put in; any other as it is.
 
-    Datasets keep the detectors, scorings, region and gate of their experiment.
+    Datasets keep the detectors, scorings, region and gate of their experiment, and are timed where it times anything.
 
     Parameters
     ----------
@@ -70,6 +70,8 @@ def combined(data: dict[str, Any], source: YamlFile, path: Path, anchor: Anchor)
             scoring = [scoring] if isinstance(scoring, str) else list(scoring)
             scorings += [one for one in scoring if one not in scorings]
             places: dict[str, Any] = {key: part[key] for key in ("region", "gate_m") if key in part}
+            if part.get("latency") is False:
+                places["latency"] = False
             usual: dict[str, Any] = {**places, "detectors": list(own), "scoring": scoring}
             datasets += [usual | dataset for dataset in part.get("datasets") or []]
             metrics = part.get("metrics", [])

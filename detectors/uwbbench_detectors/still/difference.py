@@ -84,7 +84,7 @@ class Difference(Stage[P]):
     def show_background(self, blocks: Iterable[Block]) -> None:
         """Take the background's windows together, and find the crest of its direct path."""
         self.background = background = Background.of(blocks, self.name)
-        taps = background.bins.taps
+        taps = background.bins.place
         near = np.flatnonzero((taps >= DIRECT_TAPS[0]) & (taps < DIRECT_TAPS[1]) & np.isfinite(background.mean))
         crest = int(near[np.argmax(background.mean[near])])
         self.crest_tap = self._tap(background.mean, crest)
@@ -127,7 +127,7 @@ class Difference(Stage[P]):
     def _tap(self, curve: FloatArray, place: int) -> float:
         """Taps from the first path to a crest (place) of a curve (bins,)."""
         shift = _vertex(curve, place) if self.params.interpolate else 0.0
-        return float(self.background.bins.taps[place] + shift / self.background.bins.per_tap)
+        return float(self.background.bins.place[place] + shift / self.background.bins.per_tap)
 
     def _first_run(self, above: BoolArray) -> BoolArray:
         """Bins of the first long enough run over the threshold, no farther than a pulse reaches from its start."""

@@ -30,7 +30,7 @@ def between_taps(samples: ComplexArray, first_path: FloatArray, bins: Bins, meth
         NaN outside the frame.
     """
     last = samples.shape[1] - 1
-    taps = first_path[:, None] + bins.taps
+    taps = first_path[:, None] + bins.place
     with np.errstate(invalid="ignore"):  # a first path that is not known lies outside every frame
         inside = (taps >= 0) & (taps <= last)
     taps = np.where(inside, taps, 0.0)

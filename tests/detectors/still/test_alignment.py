@@ -34,7 +34,7 @@ def test_integer_alignment_moves_the_tap_before_the_first_path_to_zero(aligned):
     samples[0, [7, 20]] = 1, 0.5
     samples[1, [9, 22]] = 2, 1
     found = aligned("cir.icir", [7.9, 9.1], samples)
-    assert found.bins.taps[[4, 17]].tolist() == [0.0, 13.0]
+    assert found.bins.place[[4, 17]].tolist() == [0.0, 13.0]
     np.testing.assert_array_equal(found.magnitude[:, 17], [0.5, 0.5])
     np.testing.assert_array_equal(found.magnitude[0, 4:40], found.magnitude[1, 4:40])
 
@@ -43,7 +43,7 @@ def test_integer_alignment_moves_the_tap_before_the_first_path_to_zero(aligned):
 def test_fractional_alignment_makes_frames_equal_whose_grids_differ(aligned, method, tolerance):
     first_path = [7.0, 7.3, 8.9, 6.55]
     found = aligned("cir.ucir", first_path, interpolation=method)
-    taps = found.bins.taps
+    taps = found.bins.place
     expected = np.exp(-(taps**2) / 3) + 0.25 * np.exp(-((taps - 12) ** 2) / 3)
     inside = (taps >= -4) & (taps < 40)
     np.testing.assert_allclose(found.magnitude[:, inside], np.tile(expected[inside], (4, 1)), atol=tolerance)
@@ -51,7 +51,7 @@ def test_fractional_alignment_makes_frames_equal_whose_grids_differ(aligned, met
 
 def test_merged_alignment_puts_each_tap_into_the_bin_nearest_to_it(aligned):
     found = aligned("cir.acir", [7.0, 7.26])
-    taps = found.bins.taps
+    taps = found.bins.place
     filled = np.isfinite(found.magnitude)
     assert filled.sum(axis=1).tolist() == [47, 46]  # taps less than four before the first path have no bin
     np.testing.assert_array_equal(taps[filled[0]] % 1, np.zeros(47))

@@ -15,7 +15,7 @@ CREST = 0.3
 
 
 def bump(tap, height=1.0):
-    return height * np.exp(-((BINS.taps - tap) ** 2) / 3)
+    return height * np.exp(-((BINS.place - tap) ** 2) / 3)
 
 
 def profile(value, count=240, stop=None, refused=()):
@@ -65,7 +65,7 @@ def test_without_interpolation_crests_are_whole_bins(found):
 
 
 def test_nothing_is_found_within_the_guard_behind_the_direct_crest(found):
-    mean = bump(CREST) + np.where(BINS.taps < CREST + 2.5, 0.3, 0.0) + bump(12.0, 0.1)
+    mean = bump(CREST) + np.where(BINS.place < CREST + 2.5, 0.3, 0.0) + bump(12.0, 0.1)
     np.testing.assert_allclose(found("detect.bma", mean)["tap"] - 7.25, 12.0 - CREST, atol=2e-3)
 
 
@@ -78,7 +78,7 @@ def test_a_window_equal_to_the_background_gives_nothing(found):
 def test_the_threshold_of_means_is_made_of_the_differences_below_zero(found):
     ripple = 0.01 * np.sign(np.sin(np.arange(BINS.count)))
     mean = bump(CREST) + ripple
-    peak = np.argmin(np.abs(BINS.taps - 15))
+    peak = np.argmin(np.abs(BINS.place - 15))
     below, above = mean.copy(), mean.copy()
     below[peak], above[peak] = bump(CREST)[peak] + 0.0299, bump(CREST)[peak] + 0.0301
     assert not len(found("detect.bma", below))
@@ -92,7 +92,7 @@ def test_the_threshold_of_deviations_is_that_of_the_f_distribution(found, counts
     background_sd = np.full(BINS.count, 0.02)
     ratio = np.sqrt(stats.f.isf(1e-3, counts[0] - 1, counts[1] - 1))
     for factor, there in ((0.999, 0), (1.001, LENGTH)):
-        sd = np.where(np.abs(BINS.taps - 15) < 0.5, 0.02 * ratio * factor, 0.02)
+        sd = np.where(np.abs(BINS.place - 15) < 0.5, 0.02 * ratio * factor, 0.02)
         assert len(found("detect.bsda", bump(CREST), sd, background_sd, counts)) == there
 
 
@@ -117,7 +117,7 @@ def test_first_takes_the_crest_of_the_nearest_run_that_is_long_enough(found):
         peak: found("detect.bma", mean, peak=peak, **params)["tap"][0] - 7.25 + CREST
         for peak, params in (("max", {}), ("first", {"run_taps": 2.0, "pulse_taps": 4.0}))
     }
-    assert taps["max"] == pytest.approx(BINS.taps[80], abs=0.1)
+    assert taps["max"] == pytest.approx(BINS.place[80], abs=0.1)
     assert taps["first"] == pytest.approx(12.0, abs=0.05)
 
 

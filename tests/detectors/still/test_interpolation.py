@@ -29,7 +29,7 @@ def test_fft_is_the_exact_shift_of_a_periodic_sinc(first_path):
     taps, crest = 51, 11.37
     bins = Bins(-4, 8, 8 * taps)
     samples = periodic_sinc(np.arange(taps) - crest, taps)[None] * np.exp(0.7j)
-    place = first_path + bins.taps
+    place = first_path + bins.place
     inside = (place >= 0) & (place <= taps - 1)
     found = between_taps(samples, np.array([first_path]), bins, "fft")[0]
     exact = periodic_sinc(place - crest, taps) * np.exp(0.7j)
@@ -42,7 +42,7 @@ def test_quadratic_is_the_spline_of_scipy_ndimage():
     first_path = np.array([5.2, 7.0, 8.71])
     found = between_taps(samples, first_path, BINS, "quadratic")
     for row in range(3):
-        place = first_path[row] + BINS.taps
+        place = first_path[row] + BINS.place
         inside = (place >= 0) & (place <= TAPS - 1)
         parts = [
             ndimage.map_coordinates(part, place[None, inside], order=2, mode="mirror")
@@ -54,7 +54,7 @@ def test_quadratic_is_the_spline_of_scipy_ndimage():
 def test_quadratic_is_the_interpolating_spline_of_scipy_away_from_the_ends():
     samples = noise(1)
     found = between_taps(samples, np.array([7.3]), BINS, "quadratic")[0]
-    place = 7.3 + BINS.taps
+    place = 7.3 + BINS.place
     inner = (place > 18) & (place < TAPS - 19)  # what is done at the ends dies away by 0.17 a tap
     spline = interpolate.make_interp_spline(np.arange(TAPS), samples[0], k=2)
     np.testing.assert_allclose(found[inner], spline(place[inner]), atol=1e-11)
@@ -63,7 +63,7 @@ def test_quadratic_is_the_interpolating_spline_of_scipy_away_from_the_ends():
 def test_linear_is_the_straight_line_of_numpy():
     samples = noise(1)
     found = between_taps(samples, np.array([7.3]), BINS, "linear")[0]
-    place = 7.3 + BINS.taps
+    place = 7.3 + BINS.place
     inside = (place >= 0) & (place <= TAPS - 1)
     np.testing.assert_allclose(found[inside], np.interp(place[inside], np.arange(TAPS), samples[0]), atol=1e-14)
 

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from uwbbench.api.case import Evidence, hard_case
+from uwbbench.api.radar import Radar
+from uwbbench.api.stage import Stage
 from uwbbench.measure.robustness.compare import hit_share, still_found
 from uwbbench.measure.robustness.scene import ECHO, NOISE_TAPS, TAPS, altered, approach
 from uwbbench.measure.robustness.subject import Subject
@@ -40,7 +44,7 @@ def two_echoes(subject: Subject) -> Evidence:
     that is how the method is defined, its descriptions name it as the fault that OS-CFAR was made to mend, and no
     rounding is at work. Such detectors are asked only for separations within their guard cells.
     """
-    within = min(stage.resolves_taps for _, stage in subject.stages())
+    within = min(_resolves_taps(stage, subject.radar) for _, stage in subject.stages())
     observed = []
     usual = hit_share(subject.usual, subject.capture)
     for separation_ns in (1.0, 2.0, 3.0):
@@ -57,3 +61,10 @@ def two_echoes(subject: Subject) -> Evidence:
         clipped = detections.with_columns(range_m=detections.range_m - np.clip(offset_m, 0.0, span_m))
         observed.append(f"{separation_ns:g} ns: {still_found(clipped, capture, usual, 0.10)}")
     return Evidence("; ".join(observed))
+
+
+def _resolves_taps(stage: Stage[Any], radar: Radar) -> float:
+    """What a stage says of itself, opened where it says anything of its own: its window may be in pulses."""
+    if type(stage).resolves_taps is not Stage.resolves_taps:
+        stage.open(radar)
+    return stage.resolves_taps

@@ -20,7 +20,15 @@ from uwbbench.measure.accuracy.verdict import Verdict
 
 
 def judge_detections(detections: Detections, scene: Scene, rules: ScoringRules, table: Table) -> Verdict:
-    """Judge every detection of a table; parameters and errors are those of the function that asks this judge."""
+    """Judge every detection of a table, for the function of the same arguments that asks this judge.
+
+    Parameters
+    ----------
+    detections : Detections
+    scene : Scene
+    rules : ScoringRules
+    table : {"filtering", "mapping"}
+    """
     if rules.scoring == "latest":
         detections = latest_answers(detections)
     frames, exhaustive = len(scene.header), scene.truth.exhaustive

@@ -33,7 +33,13 @@ EMPTY = "empty"
 
 
 def judge_presence(detections: Detections, scene: Scene, rules: ScoringRules, table: Table) -> Verdict:  # noqa: ARG001
-    """Judge every frame; parameters and errors are those of the function that asks this judge."""
+    """Judge every frame; errors are those of the function that asks this judge.
+
+    Parameters
+    ----------
+    detections, scene, rules, table
+        As :func:`~uwbbench.measure.accuracy.judge.judge` has them; the table is always ``filtering``.
+    """
     frames, exhaustive = len(scene.header), scene.truth.exhaustive
     visible = scene.visible(rules.region)
     present = np.asarray(visible.any(axis=1))

@@ -14,7 +14,15 @@ from uwbbench.measure.accuracy.scene import Scene
 
 
 def in_region(detections: Detections, scene: Scene, rules: ScoringRules, table: Table) -> Detections:
-    """Detections of scored frames in the region: those near labelled objects share their objects' place."""
+    """Detections of scored frames in the region: those near labelled objects share their objects' place.
+
+    Parameters
+    ----------
+    detections : Detections
+    scene : Scene
+    rules : ScoringRules
+    table : {"filtering", "mapping"}
+    """
     detections = detections.take(scene.scored[detections.frame])
     near = np.abs(scene.errors_m(detections, table, rules.surface)) <= rules.gate_m
     return detections.take(beside(detections, near, scene, rules))
@@ -52,6 +60,12 @@ def chance_recall(retained: IntArray, scene: Scene, rules: ScoringRules) -> floa
     One random range falls within the gate of an obstacle with probability w / L, w being the part of its gate inside
     the region and L the region's length; at least one of k with 1 - (1 - w / L)^k. In ``frame`` the gates of several
     obstacles unite.
+
+    Parameters
+    ----------
+    retained : (frames,) int array
+    scene : Scene
+    rules : ScoringRules
     """
     if rules.scoring == "peak":
         return math.nan

@@ -33,7 +33,13 @@ from uwbbench.measure.accuracy.verdict import Verdict
 
 
 def judge_segments(detections: Detections, scene: Scene, rules: ScoringRules, table: Table) -> Verdict:  # noqa: ARG001
-    """Judge every segment; parameters and errors are those of the function that asks this judge."""
+    """Judge every segment; errors are those of the function that asks this judge.
+
+    Parameters
+    ----------
+    detections, scene, rules, table
+        As :func:`~uwbbench.measure.accuracy.judge.judge` has them; the table is always ``filtering``.
+    """
     frames, exhaustive = len(scene.header), scene.truth.exhaustive
     visible = scene.visible(rules.region) & scene.scored[:, None]
     rows = _segments(detections.take(scene.scored[detections.frame]))

@@ -37,7 +37,15 @@ from uwbbench.measure.accuracy.verdict import Verdict
 
 
 def judge_tracks(detections: Detections, scene: Scene, rules: ScoringRules, table: Table) -> Verdict:
-    """Judge every track of a table; parameters and errors are those of the function that asks this judge."""
+    """Judge every track of a table, for the function of the same arguments that asks this judge.
+
+    Parameters
+    ----------
+    detections : Detections
+    scene : Scene
+    rules : ScoringRules
+    table : {"filtering", "mapping"}
+    """
     if len(detections) and "track" not in detections:
         maker = registry.makers().get("track")
         stage = f", such as '{maker}'," if maker else ""
