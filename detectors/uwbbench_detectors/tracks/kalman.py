@@ -70,8 +70,8 @@ class KalmanTrack(Stage[KalmanTrackParams]):
     The state is range and range rate; ``F = [[1, T], [0, 1]]``, ``Q = q^2 [[T^4/4, T^3/2], [T^3/2, T^2]]`` with the
     true time T between two frames, so that lost frames and other frame rates need no other settings. Detections go to
     tracks so that the sum of squared distances, in standard deviations, is least; first to confirmed tracks, what is
-    left to tentative ones. Frames that are not valid, or all zero as those that
-    were refused, count as time that has passed, and as nothing else.
+    left to tentative ones. Frames that are not valid, or all zero and without a
+    detection, as those that were refused, count as time that has passed, and as nothing else.
 
     One row for each confirmed track in each valid frame: ``range_m`` as filtered, ``range_rate_m_s`` (how it changes,
     the robot's own motion included), ``range_sd_m``, the ``track`` number, which never returns, and ``amplitude`` (and
@@ -123,13 +123,14 @@ class KalmanTrack(Stage[KalmanTrackParams]):
         self._settings[list(settings)] = list(settings.values())
         self._azimuth, self._numbered = state.AZIMUTH, state.NEXT
         self._seen = False
-        self._given: tuple[str, ...] = ()
+        self._width = 0  # columns of the detections so far
 
     def step(self, block: Block) -> Block:
         """Block whose detections are tracks."""
         frames, rows = block.frames, block.detections
         self._seen |= len(frames) > 0
-        if rows.names != self._given:
+        columns = rows.columns
+        if len(columns) != self._width:
             self._look_at(rows)
         place_m, yaw_rad = frames.odometry_position_m, frames.odometry_yaw_rad
         if not self.params.odometry or place_m is None or yaw_rad is None:
@@ -139,11 +140,14 @@ class KalmanTrack(Stage[KalmanTrackParams]):
             clock[:, 2:4] = place_m[:, :2]
             clock[:, 4] = yaw_rad
         clock[:, 0] = frames.timestamp_s
-        clock[:, 1] = frames.valid & frames.preamble.any(axis=1)
-        found = np.empty((len(rows), 1 + len(self._read)))
-        found[:, 0] = rows.frame
-        for place, name in enumerate(self._read, 1):
-            found[:, place] = rows[name]
+        clock[:, 1] = frames.valid
+        if len(frames) > 1 or not len(rows):  # in a single frame with a detection somebody has looked
+            looked = np.asarray(frames.preamble.any(axis=1))
+            looked[block.rows] = True
+            clock[:, 1] *= looked
+        found = np.empty((len(rows), len(self._read)))
+        for place, name in self._read:
+            found[:, place] = columns[name]
         if len(frames) > 1:
             found = found[np.argsort(found[:, 0], kind="stable")]
         self._tracks, table = self._follow(self._tracks, self._carried, clock, found, self._settings, frames.first)
@@ -161,9 +165,9 @@ class KalmanTrack(Stage[KalmanTrackParams]):
 
     def _look_at(self, rows: Detections) -> None:
         """Settle which columns tracks take over."""
-        self._given = rows.names
+        self._width = len(rows.columns)
         taken = ("amplitude", *(name for name in ("score_db", "azimuth_rad") if name in rows.names))
-        self._read = ("range_m", *taken)
+        read = ("frame", "range_m", *taken)
+        self._read = tuple(enumerate(read))
         self._names = ("track", "range_m", "range_rate_m_s", "range_sd_m", *taken)
-        azimuth = 1 + self._read.index("azimuth_rad") if "azimuth_rad" in taken else -1
-        self._settings[self._azimuth] = azimuth
+        self._settings[self._azimuth] = read.index("azimuth_rad") if "azimuth_rad" in taken else -1

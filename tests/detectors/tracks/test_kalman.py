@@ -201,6 +201,15 @@ def test_frames_that_are_not_valid_are_time_and_nothing_else(follow):
     assert follow(5, [(0, 2.0), (3, 2.0), (4, 2.0)], parts={"valid": early}).frame.tolist() == [4]
 
 
+def test_frames_of_zeros_are_no_misses_unless_something_was_found_in_them(make_radar, make_block, make_stage, run_cut):
+    samples = np.ones((40, 4))
+    samples[10:30] = 0
+    rows = [(k, 2.0) for k in range(40) if not 12 <= k < 18]
+    block = make_block(**given(40, rows, samples=samples))
+    found = run_cut("track.kalman", {}, make_radar(taps=4), block, list(range(1, 40))).detections
+    assert found.frame.tolist() == [*range(2, 12), *range(18, 40)]
+
+
 def test_odometry_takes_the_robots_own_motion_out_of_the_prediction(follow, make_radar):
     """A robot that stops dead before a wall: without odometry the track runs on."""
     times_s = np.arange(96) / RATE_HZ
