@@ -36,8 +36,11 @@ class RobustClutterParams(Params):
         description="Frames from one window to the next, which come out together: a frame waits for at most so many "
         "less one. A decomposition takes some twenty to forty milliseconds.",
     )
-    sparsity: float | None = Field(
-        None, gt=0, description="Weight lambda of the sparse part; null: 1 / sqrt(max(frames, taps))."
+    weight: float = Field(
+        1.0,
+        gt=0,
+        description="Of the sparse part: lambda in units of 1 / sqrt(max(frames, taps)). Below 1 what moves slowly stays "
+        "in sight, and more noise with it.",
     )
     rho: float = Field(1.5, gt=1, le=10, description="By which the penalty grows from round to round.")
 
@@ -85,6 +88,11 @@ class RobustClutter(ClutterRemoval[RobustClutterParams]):
     def every_nth(self) -> bool:
         """Whether frames come out in groups."""
         return self.params.every != 1
+
+    @property
+    def whole_windows(self) -> bool:
+        """Whether what comes out of a frame hangs on all of its window: those behind it, too."""
+        return True
 
     def open(self, radar: Radar) -> None:
         """Start with an empty window."""
@@ -137,15 +145,13 @@ class RobustClutter(ClutterRemoval[RobustClutterParams]):
         for group in groups:
             self._window = np.concatenate([self._window, samples[group]])[-self._frames :]
             if len(self._window) >= LEAST_FRAMES:
-                cleaned[group] = robust_parts(self._window, self.params.sparsity, self.params.rho)[1][-len(group) :]
+                cleaned[group] = robust_parts(self._window, self.params.weight, self.params.rho)[1][-len(group) :]
         ready = held.cut(0, stop)
         self._held, self._marked = held.cut(stop, len(held.frames)), self._marked[stop:]
         return ready.replace(frames=ready.frames.with_preamble(cleaned))
 
 
-def robust_parts(
-    window: ComplexArray, sparsity: float | None = None, rho: float = 1.5
-) -> tuple[ComplexArray, ComplexArray]:
+def robust_parts(window: ComplexArray, weight: float = 1.0, rho: float = 1.5) -> tuple[ComplexArray, ComplexArray]:
     """Low-rank and sparse part of a window.
 
     Minimises ``|L|_* + lambda |S|_1`` subject to ``L + S = X`` by the inexact method of augmented Lagrange multipliers.
@@ -158,8 +164,8 @@ def robust_parts(
     Parameters
     ----------
     window : (frames, taps) complex array
-    sparsity : float, optional
-        lambda; ``1 / sqrt(max(frames, taps))`` where it is not given (Candes, Li, Ma, Wright, J. ACM 58(3), 2011).
+    weight : float
+        lambda in units of ``1 / sqrt(max(frames, taps))`` (Candes, Li, Ma, Wright, J. ACM 58(3), 2011).
     rho : float
         Above 1.
 
@@ -176,16 +182,16 @@ def robust_parts(
     if height == 0:
         return window.copy(), np.zeros_like(window)
     scaled = window / height
-    weight = 1 / math.sqrt(max(scaled.shape)) if sparsity is None else sparsity
+    balance = weight / math.sqrt(max(scaled.shape))
     norm, spectral = float(np.linalg.norm(scaled)), float(np.linalg.norm(scaled, 2))
     penalty = 1.25 / spectral
     most = penalty * GROWTH
-    multiplier = scaled / max(spectral, 1 / weight)
+    multiplier = scaled / max(spectral, 1 / balance)
     sparse = np.zeros_like(scaled)
     for _ in range(MOST_ROUNDS):
         shift = multiplier / penalty
         low_rank = _shrunk_values(scaled - sparse + shift, 1 / penalty)
-        sparse = _shrunk_magnitudes(scaled - low_rank + shift, weight / penalty)
+        sparse = _shrunk_magnitudes(scaled - low_rank + shift, balance / penalty)
         missing = scaled - low_rank - sparse
         multiplier = multiplier + penalty * missing
         if np.linalg.norm(missing) <= TOLERANCE * norm:

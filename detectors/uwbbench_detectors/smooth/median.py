@@ -45,6 +45,11 @@ class MedianSmoothing(Stage[MedianSmoothingParams]):
     produces: ClassVar[frozenset[str]] = ports("range_m")
     fidelity = "reconstruction"
 
+    @property
+    def every_nth(self) -> bool:
+        """Whether an answer hangs on which frames were lost: the window is of frames."""
+        return self.params.frames > 1
+
     def open(self, radar: Radar) -> None:
         """Start without frames."""
         super().open(radar)

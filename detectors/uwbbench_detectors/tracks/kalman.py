@@ -70,7 +70,8 @@ class KalmanTrack(Stage[KalmanTrackParams]):
     The state is range and range rate; ``F = [[1, T], [0, 1]]``, ``Q = q^2 [[T^4/4, T^3/2], [T^3/2, T^2]]`` with the
     true time T between two frames, so that lost frames and other frame rates need no other settings. Detections go to
     tracks so that the sum of squared distances, in standard deviations, is least; first to confirmed tracks, what is
-    left to tentative ones. Frames that are not valid count as time that has passed, and as nothing else.
+    left to tentative ones. Frames that are not valid, or all zero as those that
+    were refused, count as time that has passed, and as nothing else.
 
     One row for each confirmed track in each valid frame: ``range_m`` as filtered, ``range_rate_m_s`` (how it changes,
     the robot's own motion included), ``range_sd_m``, the ``track`` number, which never returns, and ``amplitude`` (and
@@ -138,7 +139,7 @@ class KalmanTrack(Stage[KalmanTrackParams]):
             clock[:, 2:4] = place_m[:, :2]
             clock[:, 4] = yaw_rad
         clock[:, 0] = frames.timestamp_s
-        clock[:, 1] = frames.valid
+        clock[:, 1] = frames.valid & frames.preamble.any(axis=1)
         found = np.empty((len(rows), 1 + len(self._read)))
         found[:, 0] = rows.frame
         for place, name in enumerate(self._read, 1):

@@ -61,7 +61,10 @@ class Subject(StagesOnTrial):
         for name, values in detections.columns.items():
             if np.isinf(values).any():
                 raise Violation(f"{np.isinf(values).sum()} of {len(values)} detections have an infinite {name}")
-        if "amplitude" in detections and np.isnan(detections["amplitude"]).any():
+        amplitude = detections["amplitude"] if "amplitude" in detections else np.zeros(0)
+        if "track" in detections:  # a track without a detection is coasting, and has none
+            amplitude = amplitude[detections["track"] < 0]
+        if np.isnan(amplitude).any():
             raise Violation("detections have an amplitude that is no number")
         return detections
 
