@@ -39,8 +39,8 @@ class RobustClutterParams(Params):
     weight: float = Field(
         1.0,
         gt=0,
-        description="Of the sparse part: lambda in units of 1 / sqrt(max(frames, taps)). Below 1 what moves slowly stays "
-        "in sight, and more noise with it.",
+        description="Of the sparse part: lambda in units of 1 / sqrt(max(frames, taps)). Below 1 what moves slowly "
+        "stays in sight, and more noise with it.",
     )
     rho: float = Field(1.5, gt=1, le=10, description="By which the penalty grows from round to round.")
 
