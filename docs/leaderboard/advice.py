@@ -82,7 +82,7 @@ def _with_interval(row: pd.Series) -> str:
 def _by_distance(board: Board, combined: Leaderboard) -> Iterator[str]:
     """Recall by range, as the false detections of a frame belong to no distance; of approaches, by material."""
     datasets = [name for name in ("metal", "concrete", "plywood") if name in board.datasets]
-    metric = MetricChoice()["recall"]
+    recall = MetricChoice({"rank": "recall", "table": ["recall"]})
     members = [
         one
         for run in combined.content.runs
@@ -92,7 +92,7 @@ def _by_distance(board: Board, combined: Leaderboard) -> Iterator[str]:
     known: dict[object, dict[str, object]] = defaultdict(dict)
     cuts = [
         one
-        for one in slices(members, {"recall": metric}, np.array(DISTANCES_M), {"confidence": 0.95}, known)
+        for one in slices(members, recall, np.array(DISTANCES_M), {"confidence": 0.95}, known)
         if (one.channel, one.material) == (ALL, ALL) and one.span != ALL
     ]
     yield "Share of the frames in which the object was found, whatever else was; the best three of each distance."

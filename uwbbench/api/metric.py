@@ -131,7 +131,7 @@ class Metric:
 
     @staticmethod
     def partial(outcome: Outcome) -> FloatArray:
-        """Array (k,) that adds up, or samples (n,) that stack."""
+        """Array (k,) that adds up, or samples, (n,) or (n, k), that stack."""
         raise NotImplementedError
 
     @staticmethod

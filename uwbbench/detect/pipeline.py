@@ -213,8 +213,9 @@ class Pipeline:
             What the stream yields for the same frames, all blocks and the flush together.
         """
         stream = self.open(capture, audit=candidates, fused=fused, threads=threads)
-        parts = [stream.step(frames) for frames in capture.blocks(BATCH_FRAMES, sts="sts" in stream.needs)]
-        detections = Detections.join([*parts, stream.flush()])
+        sts = "sts" in stream.needs
+        blocks = capture.blocks(BATCH_FRAMES, sts=sts) if len(capture) else [capture.frames(sts=sts)]
+        detections = Detections.join([*map(stream.step, blocks), stream.flush()])
         if not len(detections):  # an empty table has the columns that a full one would have
             classes = sorted(name for name in stream.ports if name.startswith("class_probability_"))
             usual = [*(name for name in COLUMNS if name in stream.ports), *classes]

@@ -63,13 +63,17 @@ def in_frames(detections: Detections, frames: IntArray) -> Detections:
 
 
 def _partnered(detections: Detections, other: Detections) -> BoolArray:
-    """Mask of the detections that the other run has too, clustered or noise alike."""
+    """Mask of the detections that the other run has too, clustered or noise alike.
+
+    One without a range speaks of its frame as a whole, and is partnered by another such of that frame.
+    """
     mask = np.zeros(len(detections), bool)
     for row, frame in enumerate(detections.frame):
         rivals = np.flatnonzero(other.frame == frame)
         same = (detections.range_m[row] == other.range_m[rivals]) | (
             np.abs(detections.range_m[row] - other.range_m[rivals]) <= SAME_M
         )
+        same |= np.isnan(detections.range_m[row]) & np.isnan(other.range_m[rivals])
         if "cluster" in detections:
             same &= (detections["cluster"][row] < 0) == (other["cluster"][rivals] < 0)
         mask[row] = same.any()

@@ -122,10 +122,11 @@ def unit_is_given(subject: MetricSubject) -> str:
 
 @check(_METRIC)
 def partials_are_flat_arrays(subject: MetricSubject) -> None:
-    """A partial is a one-dimensional float array, of one length for all outcomes where partials are added."""
+    """A partial is a flat float array, of one length where partials are added; samples that stack may be rows."""
     partials = [subject.cls.partial(one) for one in subject.outcomes]
     for part in partials:
-        if not isinstance(part, np.ndarray) or part.ndim != 1 or part.dtype != np.float64:
+        most = 2 if subject.cls.merge == "stack" else 1
+        if not isinstance(part, np.ndarray) or not 1 <= part.ndim <= most or part.dtype != np.float64:
             observed = f"{part.dtype} of shape {part.shape}" if isinstance(part, np.ndarray) else type(part).__name__
             raise Nonconformity("float64 arrays of one dimension", observed)
     lengths = {len(part) for part in [*partials, subject.cls.partial(empty(subject.cls.of))]}

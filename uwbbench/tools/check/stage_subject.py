@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 from collections.abc import Mapping, Sequence
 from functools import cached_property
@@ -194,7 +195,8 @@ def behind_all(capture: Capture, consumes: frozenset[str]) -> Block:
     block = Block(frames_of(capture))
     ports = frozenset({"frames"})
     for name in _makers():
-        block, ports = _through(name, block, ports, capture)
+        with contextlib.suppress(UwbbenchError):  # one that refuses this radar is missed where its port is consumed
+            block, ports = _through(name, block, ports, capture)
     for port in sorted(consumes - ports):
         block, ports = _with_port(port, block, ports, capture)
     return block
@@ -203,9 +205,11 @@ def behind_all(capture: Capture, consumes: frozenset[str]) -> Block:
 def _makers() -> list[str]:
     """Default makers of ports: at each place the first, by the name of its port, for which all that it takes is there.
 
-    A range is thus taken behind the azimuth that it looks at where there is one.
+    A range is thus taken behind the azimuth that it looks at where there is one. Those that take ports away, as
+    trackers do, are left to whoever consumes what they make.
     """
-    waiting = {name: registry.load_plugin("stages", name) for name in registry.makers().values()}
+    every = {name: registry.load_plugin("stages", name) for name in registry.makers().values()}
+    waiting = {name: cls for name, cls in every.items() if not cls.removes}
     chain: list[str] = []
     ports = frozenset({"frames"})
     while ready := next((name for name, cls in waiting.items() if cls.consumes <= ports), None):
