@@ -123,14 +123,14 @@ class KalmanTrack(Stage[KalmanTrackParams]):
         self._settings[list(settings)] = list(settings.values())
         self._azimuth, self._numbered = state.AZIMUTH, state.NEXT
         self._seen = False
-        self._width = 0  # columns of the detections so far
+        self._given: tuple[str, ...] = ()
 
     def step(self, block: Block) -> Block:
         """Block whose detections are tracks."""
         frames, rows = block.frames, block.detections
         self._seen |= len(frames) > 0
         columns = rows.columns
-        if len(columns) != self._width:
+        if tuple(columns) != self._given:
             self._look_at(rows)
         place_m, yaw_rad = frames.odometry_position_m, frames.odometry_yaw_rad
         if not self.params.odometry or place_m is None or yaw_rad is None:
@@ -165,7 +165,7 @@ class KalmanTrack(Stage[KalmanTrackParams]):
 
     def _look_at(self, rows: Detections) -> None:
         """Settle which columns tracks take over."""
-        self._width = len(rows.columns)
+        self._given = rows.names
         taken = ("amplitude", *(name for name in ("score_db", "azimuth_rad") if name in rows.names))
         read = ("frame", "range_m", *taken)
         self._read = tuple(enumerate(read))
