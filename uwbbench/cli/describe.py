@@ -269,7 +269,8 @@ def checked_file(path: Path) -> str:
     if "head" in keys:
         gate = read_gate(path)
         return f"gate '{gate.name}', {len(gate.datasets)} datasets, fine"
-    if "pipeline" not in keys and ("detectors" in keys or "datasets" in keys or _extends_experiment(path, keys)):
+    of_experiments = keys & {"detectors", "datasets", "experiments"}
+    if "pipeline" not in keys and (of_experiments or _extends_experiment(path, keys)):
         experiment = read_experiment(path)
         return f"experiment '{experiment.name}', {len(experiment.detectors)} detectors, fine"
     if "pipeline" in keys or "extends" in keys:

@@ -71,6 +71,7 @@ class FirstAbove(Filter[FirstAboveParams]):
     """
 
     consumes: ClassVar[frozenset[str]] = ports("detections", "amplitude", "tap")
+    rowwise: ClassVar[bool] = False
     fidelity = "reconstruction"
 
     def open(self, radar: Radar) -> None:

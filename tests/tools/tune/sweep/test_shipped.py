@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from uwbbench.api import registry
+from uwbbench.api import ConfigError, registry
 from uwbbench.api.filters import LimitFilter
 from uwbbench.api.locate import shipped
 from uwbbench.detect.pipeline import load_detector
@@ -24,11 +24,22 @@ def thresholds(detector, capture):
     return dict(list(grid.items())[:3])
 
 
-SWEEPABLE = [
+LIMITED = [
     name
     for name in shipped("detectors")
     if any(step.use in ("filter.snr", "filter.prominence", "filter.width") for step in load_detector(name).config.steps)
 ]
+COMPARING = [
+    name for name in LIMITED if any(step.use == "select.first_above" for step in load_detector(name).config.steps)
+]
+SWEEPABLE = [name for name in LIMITED if name not in COMPARING]
+
+
+@pytest.mark.parametrize("name", COMPARING)
+def test_a_detector_that_compares_detections_is_refused(name):
+    detector = load_detector(name)
+    with pytest.raises(ConfigError, match=r"'select\.first_above' looks at several detections at once"):
+        Sweep(detector, {"pipeline.filter.snr.params.minimum_db": [5.0, 10.0]})
 
 
 @pytest.mark.parametrize("name", SWEEPABLE)
