@@ -269,7 +269,7 @@ def checked_file(path: Path) -> str:
     if "head" in keys:
         gate = read_gate(path)
         return f"gate '{gate.name}', {len(gate.datasets)} datasets, fine"
-    of_experiments = keys & {"detectors", "datasets", "experiments"}
+    of_experiments = keys.keys() & {"detectors", "datasets", "experiments"}
     if "pipeline" not in keys and (of_experiments or _extends_experiment(path, keys)):
         experiment = read_experiment(path)
         return f"experiment '{experiment.name}', {len(experiment.detectors)} detectors, fine"
@@ -283,7 +283,7 @@ def checked_file(path: Path) -> str:
         robot = registry.load_plugin("datasets", registry.default("dataset.scenes")).read_robot(path).model
         return f"robot '{robot.name}' on channels {', '.join(map(str, robot.channels))}, fine"
     first_keys = ["pipeline", "extends", "detectors", "datasets", "terms", "head", "tuning", "training", "cells"]
-    first_keys.append("channels")
+    first_keys += ["experiments", "channels"]
     near = [nearest(str(key), first_keys) for key in keys if key != "schema"]
     hint = next((text for text in near if text.startswith(" Did")), "")
     kinds = (
