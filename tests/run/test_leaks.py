@@ -49,6 +49,13 @@ def test_a_run_on_a_training_capture_is_refused_before_anything_runs(tmp_path):
     assert not (tmp_path / "run").exists()
 
 
+def test_another_detector_may_run_on_what_a_detector_was_trained_on(tmp_path):
+    datasets = [use(20, name="others"), use(3, detectors=["null"])]
+    values = {"detectors": [DETECTOR, "null"], "datasets": datasets, "latency": False, "stability": False}
+    run_experiment(read_experiment({**values, "scoring": "presence"}), tmp_path / "run", jobs=1)
+    assert (tmp_path / "run" / "manifest.json").is_file()
+
+
 def test_a_gate_on_a_training_capture_is_refused():
     accuracy = [{"metric": "f1", "scoring": "frame", "minimum": 0.1}]
     with pytest.raises(ConfigError, match="was trained on recordings"):

@@ -113,8 +113,7 @@ def run_experiment(
     """
     workers = usable_cores() if jobs is None else max(1, jobs)
     todo = plan(experiment)
-    refs = {(unit.dataset, unit.ref.name): unit.ref for unit in todo.units}
-    refuse_trained_on(experiment.runnable, ((f"{label}: {name}", ref) for (label, name), ref in refs.items()))
+    _refuse_leaks(experiment, todo)
     made = _resumed if resume else _created
     folder = made(experiment, todo, out, workers)
     try:
@@ -124,6 +123,15 @@ def run_experiment(
     except KeyboardInterrupt:
         raise Interrupted(folder.path) from None
     return folder
+
+
+def _refuse_leaks(experiment: Experiment, todo: Plan) -> None:
+    """Refuse captures that a detector which runs on them was trained on; each is opened once."""
+    for names in dict.fromkeys(source.detectors for source in experiment.datasets):
+        labels = {source.label for source in experiment.datasets if source.detectors == names}
+        refs = {(unit.dataset, unit.ref.name): unit.ref for unit in todo.units if unit.dataset in labels}
+        captures = ((f"{label}: {name}", ref) for (label, name), ref in refs.items())
+        refuse_trained_on((one for one in experiment.runnable if not names or one.name in names), captures)
 
 
 def _created(experiment: Experiment, todo: Plan, out: Path | None, jobs: int) -> RunFolder:
