@@ -6,12 +6,13 @@ import math
 
 import numpy as np
 
-from uwbbench.api.arrays import BoolArray, FloatArray, IntArray
+from uwbbench.api.arrays import BoolArray, FloatArray
 from uwbbench.api.detections import Detections
 from uwbbench.api.errors import ScoringError
 from uwbbench.api.metric import Outcome
 from uwbbench.config.rules import Table
 from uwbbench.measure.accuracy.age import latest_answers
+from uwbbench.measure.accuracy.judges.counts import Counts
 from uwbbench.measure.accuracy.judges.retained import chance_recall, in_region, strongest
 from uwbbench.measure.accuracy.matching import match_frames
 from uwbbench.measure.accuracy.rules import ScoringRules
@@ -31,16 +32,13 @@ def judge_detections(detections: Detections, scene: Scene, rules: ScoringRules, 
     """
     if rules.scoring == "latest":
         detections = latest_answers(detections)
-    frames, exhaustive = len(scene.header), scene.truth.exhaustive
+    exhaustive = scene.truth.exhaustive
     visible = scene.visible(rules.region)
     clustered = detections.take(detections["cluster"] >= 0) if table == "mapping" else detections
     kept = strongest(in_region(clustered, scene, rules, table), rules)
     error_m = scene.errors_m(kept, table, rules.surface)
     near = np.abs(error_m) <= rules.gate_m
     seen = visible[kept.frame]
-
-    def count(rows: BoolArray) -> IntArray:
-        return np.bincount(kept.frame[rows], minlength=frames).astype(np.int64)
 
     signed_m = _nearest(error_m, seen)
     signed_m = np.where(np.isnan(signed_m), _nearest(error_m, np.broadcast_to(scene.obstacle, near.shape)), signed_m)
@@ -58,41 +56,19 @@ def judge_detections(detections: Detections, scene: Scene, rules: ScoringRules, 
         matched = np.asarray((near & seen).any(axis=1))
         row, column = np.nonzero(near & seen)
         found[kept.frame[row], column] = True
-    stray = ~matched & ~wall
+    counts = Counts(scene, kept, visible, matched, wall, duplicate, found)
     if not exhaustive:
         signed_m[~matched] = np.nan
-
-    there, retained, tp = visible.sum(axis=1), count(np.ones(len(kept), bool)), count(matched)
+    there, tp = counts.there, counts.of(matched)
     if rules.scoring == "object":
         fn = there - tp
     else:
-        missed = (there > 0) & ((retained if exhaustive else tp) == 0)
+        missed = (there > 0) & ((counts.retained if exhaustive else tp) == 0)
         if rules.scoring == "peak":
             missed &= _has_true_candidate(detections, missed, scene, rules, table)
         fn = missed.astype(np.int64)
-    index = np.flatnonzero(scene.scored)
-    outcome = Outcome(
-        group=scene.group()[index],
-        tp=tp[index],
-        fp=count(stray)[index] if exhaustive else np.zeros(len(index), np.int64),
-        fn=fn[index],
-        error_frame=np.searchsorted(index, kept.frame),
-        error_m=signed_m,
-        matched=matched,
-        duration_s=len(index) / scene.header.radar.frame_rate_hz,
-        exhaustive=exhaustive,
-    )
-    return Verdict(
-        outcome=outcome,
-        true_empty=int(np.sum((there + retained)[index] == 0)),
-        duplicates=int(duplicate.sum()),
-        structure=int(wall.sum()),
-        unmatched=0 if exhaustive else int(stray.sum()),
-        chance_recall=chance_recall(retained, scene, rules) if table == "filtering" else math.nan,
-        retained=kept,
-        stray=stray,
-        found=found,
-    )
+    chance = chance_recall(counts.retained, scene, rules) if table == "filtering" else math.nan
+    return counts.verdict(Outcome(**counts.facts(fn, signed_m)), chance)
 
 
 def _nearest(error_m: FloatArray, among: BoolArray) -> FloatArray:

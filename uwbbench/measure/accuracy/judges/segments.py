@@ -25,6 +25,7 @@ from uwbbench.api.detections import Detections
 from uwbbench.api.errors import ScoringError
 from uwbbench.api.outcomes import SegmentOutcome
 from uwbbench.config.rules import Table
+from uwbbench.measure.accuracy.judges.counts import Counts
 from uwbbench.measure.accuracy.judges.retained import beside, strongest
 from uwbbench.measure.accuracy.matching import match_frames
 from uwbbench.measure.accuracy.rules import ScoringRules
@@ -40,7 +41,6 @@ def judge_segments(detections: Detections, scene: Scene, rules: ScoringRules, ta
     detections, scene, rules, table
         As :func:`~uwbbench.measure.accuracy.judge.judge` has them; the table is always ``filtering``.
     """
-    frames, exhaustive = len(scene.header), scene.truth.exhaustive
     visible = scene.visible(rules.region) & scene.scored[:, None]
     rows = _segments(detections.take(scene.scored[detections.frame]))
     rows = rows.take(beside(rows, near_segments(rows, scene, rules), scene, rules))
@@ -56,36 +56,16 @@ def judge_segments(detections: Detections, scene: Scene, rules: ScoringRules, ta
     found = np.zeros_like(visible)
     found[kept.frame[matched], partner[matched]] = True
 
-    def count(rows: BoolArray) -> IntArray:
-        return np.bincount(kept.frame[rows], minlength=frames).astype(np.int64)
-
-    there, retained, tp = visible.sum(axis=1), count(np.ones(len(kept), bool)), count(matched)
-    index = np.flatnonzero(scene.scored)
+    duplicate = stray & (near & found[kept.frame]).any(axis=1)
+    counts = Counts(scene, kept, visible, matched, wall, duplicate, found)
+    index = counts.index
     shared_m, covered_m = _overlap(kept.take(~wall), visible, scene, rules)
     outcome = SegmentOutcome(
-        group=scene.group()[index],
-        tp=tp[index],
-        fp=count(stray)[index] if exhaustive else np.zeros(len(index), np.int64),
-        fn=(there - tp)[index],
-        error_frame=np.searchsorted(index, kept.frame),
-        error_m=signed_m,
-        matched=matched,
-        duration_s=len(index) / scene.header.radar.frame_rate_hz,
-        exhaustive=exhaustive,
+        **counts.facts(counts.there - counts.of(matched), signed_m),
         shared_m=shared_m[index],
         covered_m=covered_m[index],
     )
-    return Verdict(
-        outcome=outcome,
-        true_empty=int(np.sum((there + retained)[index] == 0)),
-        duplicates=int((stray & (near & found[kept.frame]).any(axis=1)).sum()),
-        structure=int(wall.sum()),
-        unmatched=0 if exhaustive else int(stray.sum()),
-        chance_recall=math.nan,
-        retained=kept,
-        stray=stray,
-        found=found,
-    )
+    return counts.verdict(outcome, math.nan)
 
 
 def near_segments(detections: Detections, scene: Scene, rules: ScoringRules) -> BoolArray:

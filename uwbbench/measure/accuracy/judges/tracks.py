@@ -28,6 +28,7 @@ from uwbbench.api.errors import ScoringError
 from uwbbench.api.outcomes import TrackOutcome
 from uwbbench.config.rules import Table
 from uwbbench.measure.accuracy.judges import identity
+from uwbbench.measure.accuracy.judges.counts import Counts
 from uwbbench.measure.accuracy.judges.retained import chance_recall, in_region, strongest
 from uwbbench.measure.accuracy.matching import match_frames
 from uwbbench.measure.accuracy.rules import ScoringRules
@@ -53,7 +54,7 @@ def judge_tracks(detections: Detections, scene: Scene, rules: ScoringRules, tabl
             f"the detections have no column 'track': a stage that makes tracks{stage} is missing in the detector; "
             "without one, score it by 'frame', 'peak', 'object' or 'latest'"
         )
-    frames, exhaustive, cutoff_m = len(scene.header), scene.truth.exhaustive, rules.gate_m
+    frames, cutoff_m = len(scene.header), rules.gate_m
     visible = scene.visible(rules.region) & scene.scored[:, None]
     kept = strongest(in_region(detections.take(detections["track"] >= 0), scene, rules, table), rules)
     error_m = scene.errors_m(kept, table, rules.surface)
@@ -69,8 +70,8 @@ def judge_tracks(detections: Detections, scene: Scene, rules: ScoringRules, tabl
     found[kept.frame[matched], partner[matched]] = True
     duplicate = stray & (near & found[kept.frame]).any(axis=1)
 
-    def count(rows: BoolArray) -> IntArray:
-        return np.bincount(kept.frame[rows], minlength=frames).astype(np.int64)
+    counts = Counts(scene, kept, visible, matched, wall, duplicate, found)
+    there, tp = counts.there, counts.of(matched)
 
     def near_power(partner: IntArray, order: float) -> FloatArray:
         """Sum, in each frame, of the p-th powers of the assigned distances."""
@@ -81,27 +82,18 @@ def judge_tracks(detections: Detections, scene: Scene, rules: ScoringRules, tabl
 
     def ospa(partner: IntArray, order: float) -> FloatArray:
         """The p-th power of OSPA in each frame."""
-        larger = np.maximum(there, tp + count(stray))
-        total = near_power(partner, order) + cutoff_m**order * (larger - count(partner >= 0))
+        larger = np.maximum(there, tp + counts.of(stray))
+        total = near_power(partner, order) + cutoff_m**order * (larger - counts.of(partner >= 0))
         return np.asarray(total / np.maximum(larger, 1))
 
-    there, tp = visible.sum(axis=1), count(matched)
     open_m = np.where(wall[:, None], np.nan, cost_m)
     follows = identity.followers(kept.frame, kept["track"], open_m, partner, cutoff_m)
     switches, fragmentations = identity.changes(kept.frame, kept["track"], follows, visible)
-    index = np.flatnonzero(scene.scored)
+    index = counts.index
     object_frame, delay_s = _delays(kept.frame, follows, visible, scene.header.trajectory.timestamp_s)
     track_frame, false_track = _false_tracks(kept, np.asarray(near.any(axis=1)))
     outcome = TrackOutcome(
-        group=scene.group()[index],
-        tp=tp[index],
-        fp=count(stray)[index] if exhaustive else np.zeros(len(index), np.int64),
-        fn=(there - tp)[index],
-        error_frame=np.searchsorted(index, kept.frame),
-        error_m=signed_m,
-        matched=matched,
-        duration_s=len(index) / scene.header.radar.frame_rate_hz,
-        exhaustive=exhaustive,
+        **counts.facts(there - tp, signed_m),
         cutoff_m=cutoff_m,
         localisation_m2=near_power(partner, 2.0)[index],
         ospa_m=ospa(_partners(kept.frame, open_m, cutoff_m, 1.0), 1.0)[index],
@@ -113,18 +105,8 @@ def judge_tracks(detections: Detections, scene: Scene, rules: ScoringRules, tabl
         track_frame=np.searchsorted(index, track_frame),
         false_track=false_track,
     )
-    retained = count(np.ones(len(kept), bool))
-    return Verdict(
-        outcome=outcome,
-        true_empty=int(np.sum((there + retained)[index] == 0)),
-        duplicates=int(duplicate.sum()),
-        structure=int(wall.sum()),
-        unmatched=0 if exhaustive else int(stray.sum()),
-        chance_recall=chance_recall(retained, scene, rules) if table == "filtering" else math.nan,
-        retained=kept,
-        stray=stray,
-        found=found,
-    )
+    chance = chance_recall(counts.retained, scene, rules) if table == "filtering" else math.nan
+    return counts.verdict(outcome, chance)
 
 
 def _partners(frame: IntArray, cost_m: FloatArray, cutoff_m: float, order: float) -> IntArray:
