@@ -8,9 +8,9 @@ from typing import Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from uwbbench.api import Block, ComplexArray, IntArray, Params, Radar
-from uwbbench_detectors.clutter.background import LEAST_FRAMES, ClutterRemoval, frames_within
-from uwbbench_detectors.clutter.svd import MOST_FRAMES
+from uwbbench.api import Block, ComplexArray, IntArray, Radar
+from uwbbench_detectors.clutter.background import LEAST_FRAMES, ClutterRemoval
+from uwbbench_detectors.clutter.window import WindowParams
 
 TOLERANCE = 1e-7
 """Largest part of a window, in the norm of Frobenius, by which the two parts may miss it."""
@@ -19,17 +19,10 @@ GROWTH = 1e7
 """Of the penalty, at most."""
 
 
-class RobustClutterParams(Params):
+class RobustClutterParams(WindowParams):
     """Window, and how its two parts are weighed."""
 
     window_frames: int = Field(64, ge=LEAST_FRAMES, description="Frames of the window.")
-    window_s: float | None = Field(
-        None,
-        gt=0,
-        description="Seconds of the window, so that one fits radars of any frame rate: at least "
-        f"{LEAST_FRAMES} frames, and at most {MOST_FRAMES}, as the time of a window grows with them. window_frames, "
-        "where it is given too, goes before.",
-    )
     every: int = Field(
         16,
         ge=1,
@@ -46,20 +39,10 @@ class RobustClutterParams(Params):
 
     @model_validator(mode="after")
     def _windows_overlap(self) -> Self:
-        least = LEAST_FRAMES if self._in_seconds else self.window_frames
+        least = self.least_frames
         if self.every > least:
             raise ValueError(f"'every' is {self.every}, but a window of {least} frames must hold all of them")
         return self
-
-    def frames_for(self, radar: Radar) -> int:
-        """Frames of the window for a radar."""
-        if self.window_s is None or not self._in_seconds:
-            return self.window_frames
-        return min(frames_within(self.window_s, radar), MOST_FRAMES)
-
-    @property
-    def _in_seconds(self) -> bool:
-        return self.window_s is not None and "window_frames" not in self.model_fields_set
 
 
 class RobustClutter(ClutterRemoval[RobustClutterParams]):

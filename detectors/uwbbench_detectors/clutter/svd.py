@@ -8,27 +8,18 @@ from typing import Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from uwbbench.api import ComplexArray, ConfigError, FloatArray, IntArray, Params, Radar
-from uwbbench_detectors.clutter.background import LEAST_FRAMES, ClutterRemoval, frames_within
+from uwbbench.api import ComplexArray, ConfigError, FloatArray, IntArray, Radar
+from uwbbench_detectors.clutter.background import ClutterRemoval
+from uwbbench_detectors.clutter.window import WindowParams
 
 EPSILON = float(np.finfo(np.float64).eps)
-MOST_FRAMES = 64
-"""Of a window whose length is given in seconds."""
 TOLERANCE = 1e-10
 """Largest error of a cleaned sample, over the frame's largest one, that the fast way of decomposing may leave."""
 
 
-class SvdClutterParams(Params):
+class SvdClutterParams(WindowParams):
     """Window and rank of the clutter."""
 
-    window_frames: int = Field(64, ge=2, description="Frames of the window, the current one included.")
-    window_s: float | None = Field(
-        None,
-        gt=0,
-        description="Seconds of the window, so that one fits radars of any frame rate: at least "
-        f"{LEAST_FRAMES} frames, and at most {MOST_FRAMES}, as the time of a frame grows with them. window_frames, "
-        "where it is given too, goes before.",
-    )
     rank: int | None = Field(1, ge=1, description="Dominant shapes removed; null: as many as hold 'energy'.")
     energy: float = Field(0.95, gt=0, lt=1, description="Share of the window's energy to remove where rank is null.")
     maximum_rank: int = Field(3, ge=1, description="Limit of the rank where it is chosen by energy.")
@@ -41,7 +32,7 @@ class SvdClutterParams(Params):
 
     @model_validator(mode="after")
     def _window_exceeds_rank(self) -> Self:
-        least = LEAST_FRAMES if self._in_seconds else self.window_frames
+        least = self.least_frames
         if self.largest_rank >= least:
             name = "maximum_rank" if self.rank is None else "rank"
             raise ValueError(
@@ -49,16 +40,6 @@ class SvdClutterParams(Params):
                 "it must be smaller than 'window_frames'"
             )
         return self
-
-    def frames_for(self, radar: Radar) -> int:
-        """Frames of the window for a radar."""
-        if self.window_s is None or not self._in_seconds:
-            return self.window_frames
-        return min(frames_within(self.window_s, radar), MOST_FRAMES)
-
-    @property
-    def _in_seconds(self) -> bool:
-        return self.window_s is not None and "window_frames" not in self.model_fields_set
 
 
 class SvdClutter(ClutterRemoval[SvdClutterParams]):
