@@ -9,7 +9,7 @@ from typing import Any
 from uwbbench.api import registry
 from uwbbench.api.errors import ConfigError, PluginError, nearest
 from uwbbench.api.locate import find_config, shipped
-from uwbbench.api.text import without_markup
+from uwbbench.api.text import counted, without_markup
 from uwbbench.api.yaml_file import read_yaml
 
 _CLASSES = ("stages", "datasets", "metrics", "terms")
@@ -260,9 +260,8 @@ def checked_file(path: Path) -> str:
         return f"tuning '{tuning.name}', {len(tuning.tuning)} datasets to tune on, fine"
     if "training" in keys:
         training = read_training(path)
-        return (
-            f"training '{training.name}' of {training.step.use}, {len(training.training)} datasets to learn from, fine"
-        )
+        learned = counted(len(training.training), "dataset")
+        return f"training '{training.name}' of {training.step.use}, {learned} to learn from, fine"
     if "cells" in keys:
         fit = read_fit(path)
         return f"fit '{fit.name}', {len(fit.start)} parameters, {len(fit.targets)} targets, fine"

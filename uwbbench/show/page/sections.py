@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
+from uwbbench.api.text import counted
 from uwbbench.results.verdicts import BOUNDS, INTERVALS
 from uwbbench.show.page import answer, error_sections, limits_section
 from uwbbench.show.page.limits_section import limits
@@ -187,6 +188,7 @@ def _counts(content: Content) -> str:
     licences = sorted({shown(one["license"]) for one in captures})
     failures = f"{len(report.failures)} units failed" if report.failures else "no unit failed"
     return (
-        f"{len(report.detectors)} detectors, {len(captures)} captures in {len(content.datasets)} datasets "
+        f"{counted(len(report.detectors), 'detector')}, {counted(len(captures), 'capture')} in "
+        f"{counted(len(content.datasets), 'dataset')} "
         f"(licence: {', '.join(licences) or 'none'}), {sum(one['frames'] for one in captures)} frames; {failures}."
     )
