@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from uwbbench.api.aligned import AlignedProfile, Bins, WindowProfile
+    from uwbbench.api.anchors import Anchors, Messages
     from uwbbench.api.arrays import BoolArray, ComplexArray, FloatArray, IntArray
     from uwbbench.api.block import Block
     from uwbbench.api.capture import Capture, CaptureHeader, Samples, analytic
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from uwbbench.api.compiling import compiled, inlined
     from uwbbench.api.dataset import Card, Dataset, DatasetFile, DatasetFolder
     from uwbbench.api.detections import COLUMNS, Detections
+    from uwbbench.api.drive import Drive, odometry_of, relative
     from uwbbench.api.errors import (
         CaptureError,
         ConfigError,
@@ -46,6 +48,7 @@ if TYPE_CHECKING:
     from uwbbench.api.kernel import Kernel
     from uwbbench.api.learning import Assessed, Example, LearnedParams, Trainable, Weights, expect_arrays
     from uwbbench.api.locate import find_config
+    from uwbbench.api.mapper import LANDMARK_KINDS, Grid, Landmarks, Map, Mapped, Mapper, Poses, Step
     from uwbbench.api.metric import Metric, Outcome
     from uwbbench.api.numba_internals import as_tuple
     from uwbbench.api.outcomes import PresenceOutcome, SegmentOutcome, TrackOutcome
@@ -61,6 +64,7 @@ if TYPE_CHECKING:
 
 _HOME = {
     "aligned": ("AlignedProfile", "Bins", "WindowProfile"),
+    "anchors": ("Anchors", "Messages"),
     "arrays": ("BoolArray", "ComplexArray", "FloatArray", "IntArray"),
     "block": ("Block",),
     "capture": ("Capture", "CaptureHeader", "Samples", "analytic"),
@@ -71,6 +75,7 @@ _HOME = {
     "compiling": ("compiled", "inlined"),
     "dataset": ("Card", "Dataset", "DatasetFile", "DatasetFolder"),
     "detections": ("COLUMNS", "Detections"),
+    "drive": ("Drive", "odometry_of", "relative"),
     "errors": ("CaptureError", "ConfigError", "PluginError", "ScoringError", "StoreError", "UwbbenchError", "nearest"),
     "filters": ("Limit", "LimitFilter", "RankFilter", "RankParams"),
     "frames": ("Frames", "magnitude"),
@@ -89,6 +94,7 @@ _HOME = {
     "kernel": ("Kernel",),
     "learning": ("Assessed", "Example", "LearnedParams", "Trainable", "Weights", "expect_arrays"),
     "locate": ("find_config",),
+    "mapper": ("LANDMARK_KINDS", "Grid", "Landmarks", "Map", "Mapped", "Mapper", "Poses", "Step"),
     "metric": ("Metric", "Outcome"),
     "numba_internals": ("as_tuple",),
     "outcomes": ("PresenceOutcome", "SegmentOutcome", "TrackOutcome"),
@@ -107,8 +113,10 @@ _MODULE_OF = {name: module for module, names in _HOME.items() for name in names}
 __all__ = [
     "CHANNEL_CENTER_HZ",
     "COLUMNS",
+    "LANDMARK_KINDS",
     "SPEED_OF_LIGHT_M_S",
     "AlignedProfile",
+    "Anchors",
     "Assessed",
     "Bins",
     "Block",
@@ -123,6 +131,7 @@ __all__ = [
     "DatasetFile",
     "DatasetFolder",
     "Detections",
+    "Drive",
     "EchoFading",
     "EchoTail",
     "Evidence",
@@ -131,11 +140,17 @@ __all__ = [
     "Filter",
     "FloatArray",
     "Frames",
+    "Grid",
     "IntArray",
     "Kernel",
+    "Landmarks",
     "LearnedParams",
     "Limit",
     "LimitFilter",
+    "Map",
+    "Mapped",
+    "Mapper",
+    "Messages",
     "Metric",
     "NotApplicable",
     "Obstacle",
@@ -144,6 +159,7 @@ __all__ = [
     "Params",
     "Paths",
     "PluginError",
+    "Poses",
     "PresenceOutcome",
     "Pulse",
     "Radar",
@@ -157,6 +173,7 @@ __all__ = [
     "Sight",
     "Stage",
     "StagesOnTrial",
+    "Step",
     "StoreError",
     "Term",
     "TrackOutcome",
@@ -189,10 +206,12 @@ __all__ = [
     "magnitude",
     "nearest",
     "nearest_on_outline",
+    "odometry_of",
     "open_capture",
     "ports",
     "read_yaml",
     "receiver_pose",
+    "relative",
     "rotate_z",
     "segments_cross",
     "simulated_recording",

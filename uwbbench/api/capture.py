@@ -12,6 +12,7 @@ from typing import Any, Literal, Protocol, runtime_checkable
 
 import numpy as np
 
+from uwbbench.api.anchors import Anchors
 from uwbbench.api.arrays import BoolArray, ComplexArray, FloatArray, lock_fields, locked
 from uwbbench.api.errors import CaptureError
 from uwbbench.api.frames import Frames
@@ -148,6 +149,8 @@ class Capture(CaptureHeader):
     background : Capture or None
         What the same radar on the same robot recorded with nothing in view, with noise of its own. Shown to stages that
         need a ``background``.
+    anchors : Anchors or None
+        Anchors around the receiver, and what it heard of them.
     """
 
     preamble: Samples
@@ -160,6 +163,7 @@ class Capture(CaptureHeader):
     odometry_yaw_rad: FloatArray | None = None
     receivers: tuple[str, ...] = field(default=())
     background: Capture | None = None
+    anchors: Anchors | None = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -304,4 +308,6 @@ class Capture(CaptureHeader):
                 digest.update(np.ascontiguousarray(array[start : start + 65536]).tobytes())
         if self.background is not None:  # without one, the hash is that of earlier versions
             digest.update(f"background {self.background.sha256}".encode())
+        if self.anchors is not None:
+            digest.update(f"anchors {self.anchors.sha256}".encode())
         return digest.hexdigest()

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import ClassVar, Generic, Literal
 
 from uwbbench.api.capture import Capture
+from uwbbench.api.drive import Drive
 from uwbbench.api.errors import CaptureError
 from uwbbench.api.stage import P, Params, params_type_of
 
@@ -129,6 +130,30 @@ class Dataset(Generic[P]):
             If its files are missing or broken; the message names the file.
         """
         raise NotImplementedError
+
+    def runs(self) -> dict[str, tuple[str, ...]]:
+        """Names of the captures of each run: of the receivers of one drive of one robot, found without reading them.
+
+        Unless an adapter says otherwise, each capture is a run of its own.
+        """
+        return {name: (name,) for name in self.names()}
+
+    def open_run(self, name: str, captures: Sequence[str]) -> Drive:
+        """Read captures of one run.
+
+        Parameters
+        ----------
+        name : str
+            Of the run.
+        captures : sequence of str
+            Those of its captures that are wanted.
+
+        Raises
+        ------
+        CaptureError
+            If files are missing or broken, or the captures are of no one run.
+        """
+        return Drive(name, tuple(self.open(capture) for capture in captures))
 
     def file(self, path: str) -> Path:
         """One of the dataset's files on disk: in one of the roots, or in the card's folder below it.

@@ -1,7 +1,7 @@
 """Finding plugins by name, without importing any before one is asked for.
 
-Plugins are entry points of six groups: stages, datasets, metrics, terms and kernels are classes; a detector is a YAML
-file in a package, named ``package.module:file.yaml``. Built-in plugins are registered in the same way.
+Plugins are entry points of seven groups: stages, mappers, datasets, metrics, terms and kernels are classes; a detector
+is a YAML file in a package, named ``package.module:file.yaml``. Built-in plugins are registered in the same way.
 
 Two more groups say what belongs to plugins, so that the framework names none: ``uwbbench.defaults`` maps a role to the
 plugin that fills it where nobody names one, and ``uwbbench.cases`` holds the hard cases of a package's stages.
@@ -20,16 +20,16 @@ from typing import Any, Literal, get_args
 from uwbbench.api.errors import PluginError, nearest
 from uwbbench.api.interruption import by_plugin
 
-ClassKind = Literal["stages", "datasets", "metrics", "terms", "kernels"]
+ClassKind = Literal["stages", "mappers", "datasets", "metrics", "terms", "kernels"]
 PluginKind = ClassKind | Literal["detectors"]
 Group = PluginKind | Literal["defaults", "cases"]
 AuthoredKind = Literal["stage", "detector", "dataset", "metric"]
 """Kinds, in the singular, that a package can be written for and that have conformance checks."""
 AUTHORED_KINDS: tuple[AuthoredKind, ...] = get_args(AuthoredKind)
-KINDS: tuple[PluginKind, ...] = ("stages", "detectors", "datasets", "metrics", "terms")
+KINDS: tuple[PluginKind, ...] = ("stages", "mappers", "detectors", "datasets", "metrics", "terms")
 """Kinds whose names people write in files; kernels step in by themselves."""
 
-_CLASSES = ("stages", "datasets", "metrics", "terms")
+_CLASSES = ("stages", "mappers", "datasets", "metrics", "terms")
 HERE_ALONE = "this process"
 """Package of what :func:`register` has named."""
 
@@ -83,7 +83,7 @@ def entries(kind: Group) -> dict[str, Entry]:
     return known
 
 
-def register(kind: Literal["stages", "datasets", "metrics", "terms"], name: str, plugin: type[Any]) -> None:
+def register(kind: Literal["stages", "mappers", "datasets", "metrics", "terms"], name: str, plugin: type[Any]) -> None:
     """Give a class a name in this process, as an entry point of an installed package does everywhere.
 
     For scripts and notebooks. Other processes do not know the name: what runs in several, is timed, or is called from
@@ -91,7 +91,7 @@ def register(kind: Literal["stages", "datasets", "metrics", "terms"], name: str,
 
     Parameters
     ----------
-    kind : {"stages", "datasets", "metrics", "terms"}
+    kind : {"stages", "mappers", "datasets", "metrics", "terms"}
     name : str
         A name that was registered here before is given to the new class, as when a cell of a notebook runs again.
     plugin : type

@@ -12,7 +12,7 @@ from uwbbench.api.locate import find_config, shipped
 from uwbbench.api.text import counted, without_markup
 from uwbbench.api.yaml_file import read_yaml
 
-_CLASSES = ("stages", "datasets", "metrics", "terms")
+_CLASSES = ("stages", "mappers", "datasets", "metrics", "terms")
 
 
 def everything_named(name: str) -> dict[str, dict[str, Any]]:

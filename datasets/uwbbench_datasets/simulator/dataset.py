@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import Any, ClassVar
 
 from pydantic import Field
 
-from uwbbench.api import Capture, CaptureError, Card, ConfigError, Dataset, Params, find_config, nearest
+from uwbbench.api import Capture, CaptureError, Card, ConfigError, Dataset, Drive, Params, find_config, nearest
 from uwbbench_datasets.simulator.engine import Simulation, simulate
 from uwbbench_datasets.simulator.robot import RobotModel, read_robot_file
 from uwbbench_datasets.simulator.scene import Scene, SceneModel, TermUse, read_scenes
@@ -71,9 +72,14 @@ class Simulated(Dataset[SimulatedParams]):
             return scene
         return scene.seeded(self.params.seed)
 
-    def runs(self) -> list[str]:
-        """Names of the runs, each of which holds all receivers: ``scene/variant/run``."""
-        return list(self._runs)
+    def runs(self) -> dict[str, tuple[str, ...]]:
+        """Captures of each run, one a receiver, by ``scene/variant/run``."""
+        return {run: tuple(self._captures(run)) for run in self._runs}
+
+    def open_run(self, name: str, captures: Sequence[str]) -> Drive:
+        """Simulate a run once for all of its receivers."""
+        made = {capture.name: capture for capture in self.simulate(name).captures}
+        return Drive(name, tuple(made[capture] for capture in captures))
 
     def simulate(self, run: str, *, threads: int = 1) -> Simulation:
         """Simulate one run, with all of its receivers.
@@ -100,7 +106,8 @@ class Simulated(Dataset[SimulatedParams]):
     def scene(self, name: str) -> str:
         """Scene with its variant, and with the run where runs draw places anew; receivers are no other scenes."""
         runs = self._runs.items()
-        own = ((run if scene.model.draw else scene.name) for run, (scene, _) in runs if name in self._captures(run))
+        of = ((run, scene) for run, (scene, _) in runs if name == run or name in self._captures(run))
+        own = (run if scene.model.draw else scene.name for run, scene in of)
         return next(own, name)
 
     def open(self, name: str) -> Capture:

@@ -116,7 +116,7 @@ def open_cell(files: Files, cell: Cell, seed: int, runs: int) -> Dataset[Any]:
     path = files[cell.scene]
     params = {"scenes": [str(path)], "set": {**cell.set, "seed": seed}, "runs": runs}
     dataset: Dataset[Any] = open_dataset(registry.default("dataset.scenes"), params, [path.parent])
-    several = len(dataset.runs()) // runs  # type: ignore[attr-defined]
+    several = len(dataset.runs()) // runs
     if several != 1:
         raise ConfigError(f"cell '{cell.name}': its scene varies into {several}; fix what 'vary' lists by 'set'")
     return dataset

@@ -1,0 +1,153 @@
+"""A drive: what all receivers of a robot recorded in one run, merged by time."""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from uwbbench.api.arrays import FloatArray, IntArray, locked
+from uwbbench.api.capture import Capture, CaptureHeader
+from uwbbench.api.errors import CaptureError
+from uwbbench.api.geometry import wrap_angle
+from uwbbench.api.radar import Radar
+from uwbbench.api.truth import Trajectory
+
+AGREEMENT_M = 0.01
+"""Largest difference of the odometry that two receivers of one robot may report for the same time."""
+
+AGREEMENT_RAD = 0.01
+"""The same for its heading."""
+
+
+@dataclass(frozen=True)
+class Drive:
+    """The captures of one run.
+
+    Its *steps* are the times at which any receiver has a frame, in order: the ticks of the robot's clock.
+
+    Attributes
+    ----------
+    name : str
+    captures : tuple of Capture
+        One a receiver, each with odometry.
+
+    Raises
+    ------
+    CaptureError
+        If there are none, a receiver appears twice, odometry is missing or not finite, or two receivers disagree in
+        time or odometry.
+    """
+
+    name: str
+    captures: tuple[Capture, ...]
+
+    def __post_init__(self) -> None:
+        if not self.captures:
+            raise CaptureError(f"run '{self.name}' has no captures")
+        names = [capture.radar.receiver for capture in self.captures]
+        twice = next((name for name in names if names.count(name) > 1), None)
+        if twice is not None:
+            raise CaptureError(f"run '{self.name}' has two captures of the receiver '{twice}'")
+        for capture in self.captures:
+            _check_odometry(capture)
+        for other in self.captures[1:]:
+            _check_agreement(self.captures[0], other)
+
+    def __len__(self) -> int:
+        return len(self.time_s)
+
+    @property
+    def radars(self) -> dict[str, Radar]:
+        """Radar of each receiver."""
+        return {capture.radar.receiver: capture.radar for capture in self.captures}
+
+    @cached_property
+    def time_s(self) -> FloatArray:
+        """Time of each step (steps,)."""
+        return locked(np.unique(np.concatenate([capture.trajectory.timestamp_s for capture in self.captures])))
+
+    def steps_of(self, capture: Capture) -> IntArray:
+        """Step (frames,) of each frame of one of the captures."""
+        return np.searchsorted(self.time_s, capture.trajectory.timestamp_s)
+
+    @cached_property
+    def odometry(self) -> FloatArray:
+        """x, y and yaw (steps, 3) as odometry has them; of the first receiver that has a frame then."""
+        poses = np.empty((len(self), 3))
+        for capture in reversed(self.captures):
+            poses[self.steps_of(capture)] = odometry_of(capture)
+        return locked(poses)
+
+    @cached_property
+    def moved(self) -> FloatArray:
+        """Odometry of each step (steps, 3) since the one before, in the robot's frame there; zeros in the first."""
+        steps = np.zeros((len(self), 3))
+        if len(self) > 1:
+            steps[1:] = relative(self.odometry[:-1], self.odometry[1:])
+        return locked(steps)
+
+    @cached_property
+    def header(self) -> CaptureHeader:
+        """The run without samples: truth, true poses at the steps, and the radar of the first receiver."""
+        position_m, yaw_rad = np.empty((len(self), 3)), np.empty(len(self))
+        for capture in reversed(self.captures):
+            steps = self.steps_of(capture)
+            position_m[steps], yaw_rad[steps] = capture.trajectory.position_m, capture.trajectory.yaw_rad
+        first = self.captures[0].header
+        trajectory = Trajectory(self.time_s, position_m, yaw_rad)
+        return dataclasses.replace(first, name=self.name, trajectory=trajectory, recording=first.recording)
+
+    @cached_property
+    def sha256(self) -> str:
+        """Of the content of all captures, in order."""
+        text = "\n".join(f"{capture.radar.receiver} {capture.sha256}" for capture in self.captures)
+        return hashlib.sha256(text.encode()).hexdigest()
+
+
+def odometry_of(capture: Capture) -> FloatArray:
+    """x, y and yaw (frames, 3) of a capture's odometry, which it must have."""
+    position_m, yaw_rad = capture.odometry_position_m, capture.odometry_yaw_rad
+    if position_m is None or yaw_rad is None:
+        raise CaptureError(f"capture '{capture.name}' has no odometry, which a mapper needs")
+    return np.column_stack([position_m[:, :2], yaw_rad])
+
+
+def relative(start: FloatArray, end: FloatArray) -> FloatArray:
+    """Poses ``end`` (n, 3) as seen from the poses ``start`` (n, 3)."""
+    cosine, sine = np.cos(start[:, 2]), np.sin(start[:, 2])
+    x, y = (end - start)[:, 0], (end - start)[:, 1]
+    return np.column_stack([cosine * x + sine * y, cosine * y - sine * x, wrap_angle(end[:, 2] - start[:, 2])])
+
+
+def _check_odometry(capture: Capture) -> None:
+    if not len(capture):
+        raise CaptureError(f"capture '{capture.name}' has no frames")
+    finite = np.isfinite(odometry_of(capture)).all(axis=1)
+    if not finite.all():
+        raise CaptureError(f"capture '{capture.name}': odometry is not finite in frame {int(np.argmin(finite))}")
+
+
+def _check_agreement(first: Capture, other: Capture) -> None:
+    """Refuse two receivers that cannot have been on one robot at one time."""
+    pair = f"captures '{first.name}' and '{other.name}' are no receivers of one run"
+    times = [capture.trajectory.timestamp_s for capture in (first, other)]
+    start, stop = max(t[0] for t in times), min(t[-1] for t in times)
+    if start > stop:
+        spans = " and ".join(f"{t[0]:g} to {t[-1]:g} s" for t in times)
+        raise CaptureError(f"{pair}: their times, {spans}, have nothing in common")
+    shared = (times[1] >= start) & (times[1] <= stop)
+    mine, theirs = odometry_of(first), odometry_of(other)[shared]
+    at = times[1][shared]
+    columns = (mine[:, 0], mine[:, 1], np.unwrap(mine[:, 2]))
+    expected = np.column_stack([np.interp(at, times[0], column) for column in columns])
+    apart_m = np.hypot(*(theirs - expected)[:, :2].T)
+    apart_rad = np.abs(wrap_angle(theirs[:, 2] - expected[:, 2]))
+    wrong = (apart_m > AGREEMENT_M) | (apart_rad > AGREEMENT_RAD)
+    if wrong.any():
+        row = int(np.argmax(wrong))
+        difference = f"{100 * apart_m[row]:.1f} cm and {np.degrees(apart_rad[row]):.1f} degrees at {at[row]:g} s"
+        raise CaptureError(f"{pair}: their odometry differs by {difference}")
