@@ -247,5 +247,6 @@ def _bare(detections: Detections) -> Detections:
     """Detections without the means to find candidates later, which would drag the capture between processes."""
     columns: dict[str, Any] = detections.columns
     bare = Detections(**columns, processed=detections.processed, notes=detections.notes, chain=detections.chain)
+    bare = bare.annotated(mapped=detections.mapped)
     answered = detections.answered
     return bare if answered is None else bare.with_hand_outs(columns[HANDED_OUT], answered)
