@@ -325,6 +325,21 @@ class MappingPipeline:
         ready = self._ready(drive)
         return found.with_hand_outs(ready[found.frame], ready[poses.index])
 
+    def answers(self, drive: Drive, steps: int) -> Detections:
+        """When the poses of the first steps were handed out: a row a pose, with hand-outs.
+
+        Parameters
+        ----------
+        drive : Drive
+        steps : int
+            So many.
+        """
+        found = self.run(drive, handed_out=True)
+        assert found.answered is not None  # noqa: S101 - asked for
+        early = found.processed < steps
+        index, answered = found.processed[early], found.answered[early]
+        return Detections(index, processed=index).with_hand_outs(answered, answered)
+
     def _ready(self, drive: Drive) -> IntArray:
         """Step (steps,) after which all front ends have answered for each; the number of steps for only at the end."""
         ready = np.arange(len(drive))
