@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from uwbbench.api.compiling import compiled, inlined
     from uwbbench.api.dataset import Card, Dataset, DatasetFile, DatasetFolder
     from uwbbench.api.detections import COLUMNS, Detections
-    from uwbbench.api.drive import Drive, odometry_of, relative
+    from uwbbench.api.drive import Drive, compose, odometry_of, relative
     from uwbbench.api.errors import (
         CaptureError,
         ConfigError,
@@ -75,7 +75,7 @@ _HOME = {
     "compiling": ("compiled", "inlined"),
     "dataset": ("Card", "Dataset", "DatasetFile", "DatasetFolder"),
     "detections": ("COLUMNS", "Detections"),
-    "drive": ("Drive", "odometry_of", "relative"),
+    "drive": ("Drive", "compose", "odometry_of", "relative"),
     "errors": ("CaptureError", "ConfigError", "PluginError", "ScoringError", "StoreError", "UwbbenchError", "nearest"),
     "filters": ("Limit", "LimitFilter", "RankFilter", "RankParams"),
     "frames": ("Frames", "magnitude"),
@@ -193,6 +193,7 @@ __all__ = [
     "cases_of",
     "checked",
     "compiled",
+    "compose",
     "direction",
     "exact_ulps",
     "expect_arrays",
