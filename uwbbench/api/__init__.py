@@ -48,7 +48,7 @@ if TYPE_CHECKING:
     from uwbbench.api.kernel import Kernel
     from uwbbench.api.learning import Assessed, Example, LearnedParams, Trainable, Weights, expect_arrays
     from uwbbench.api.locate import find_config
-    from uwbbench.api.mapper import LANDMARK_KINDS, Grid, Landmarks, Map, Mapped, Mapper, Poses, Step
+    from uwbbench.api.mapper import LANDMARK_KINDS, Grid, LandmarkKind, Landmarks, Map, Mapped, Mapper, Poses, Step
     from uwbbench.api.metric import Metric, Outcome
     from uwbbench.api.numba_internals import as_tuple
     from uwbbench.api.outcomes import PresenceOutcome, SegmentOutcome, TrackOutcome
@@ -94,7 +94,7 @@ _HOME = {
     "kernel": ("Kernel",),
     "learning": ("Assessed", "Example", "LearnedParams", "Trainable", "Weights", "expect_arrays"),
     "locate": ("find_config",),
-    "mapper": ("LANDMARK_KINDS", "Grid", "Landmarks", "Map", "Mapped", "Mapper", "Poses", "Step"),
+    "mapper": ("LANDMARK_KINDS", "Grid", "LandmarkKind", "Landmarks", "Map", "Mapped", "Mapper", "Poses", "Step"),
     "metric": ("Metric", "Outcome"),
     "numba_internals": ("as_tuple",),
     "outcomes": ("PresenceOutcome", "SegmentOutcome", "TrackOutcome"),
@@ -143,6 +143,7 @@ __all__ = [
     "Grid",
     "IntArray",
     "Kernel",
+    "LandmarkKind",
     "Landmarks",
     "LearnedParams",
     "Limit",
