@@ -132,7 +132,7 @@ def simulate(scene: Scene, run: int = 1, *, background: bool = False, threads: i
             structure = tuple(body for body in objects if body.structure)
             empty, _ = _one_receiver(scene, run, receiver, trajectory, structure, (), threads, background=True)
             said = f"Simulated by uwbbench. {capture.name} without its objects, with noise of its own."
-            named = replace(empty, name=f"{empty.name} background", description=said)
+            named = replace(empty, name=f"{empty.name} background", description=said, anchors=None)
             capture = replace(capture, background=named)
         captures.append(capture)
         contributions[receiver] = of_terms
