@@ -1,4 +1,4 @@
-"""What a detector is, as one hash: its resolved file, and the sources of what it is made of; and as a name in tables."""
+"""What a detector is, as one hash and as a name in tables: its resolved file, and the sources of what it is made of."""
 
 from __future__ import annotations
 
