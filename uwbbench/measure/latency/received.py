@@ -13,9 +13,19 @@ from typing import Any
 import numpy as np
 
 from uwbbench.api.capture import PER_FRAME, Capture
+from uwbbench.api.drive import Drive
 from uwbbench.api.truth import Trajectory
+from uwbbench.measure.latency.played import Played
 
 _SAMPLES = ("preamble", "sts1", "sts2")
+
+
+def received_run(drive: Drive, steps: int | None = None) -> Drive:
+    """First steps of a run, as :func:`received` gives the frames of a capture."""
+    stop = len(drive) if steps is None else min(steps, len(drive))
+    counts = {name: int(np.searchsorted(numbers, stop)) for name, numbers in drive.steps.items()}
+    parts = [received(capture, counts[capture.radar.receiver]) for capture in drive.captures]
+    return Drive(drive.name, tuple(parts))
 
 
 def received(capture: Capture, frames: int | None = None) -> Capture:
@@ -32,6 +42,8 @@ def received(capture: Capture, frames: int | None = None) -> Capture:
     capture.frames(0, count)  # a damaged file is named here
     parts: dict[str, Any] = {name: _copied(getattr(capture, name), count) for name in _SAMPLES if _has(capture, name)}
     parts |= {name: getattr(capture, name)[:count] for name in PER_FRAME if _has(capture, name)}
+    if capture.anchors is not None:
+        parts["anchors"] = capture.anchors.of_frames(np.arange(count))
     track = capture.trajectory
     poses = Trajectory(track.timestamp_s[:count], track.position_m[:count], track.yaw_rad[:count])
     return dataclasses.replace(capture, truth=None, trajectory=poses, **parts)
@@ -47,15 +59,17 @@ def _has(capture: Capture, name: str) -> bool:
     return getattr(capture, name) is not None
 
 
-def laps(capture: Capture, frames: int, *, renumbered: bool = True) -> tuple[Capture, list[int]]:
+def laps(capture: Played, frames: int, *, renumbered: bool = True) -> tuple[Played, list[int]]:
     """Received frames handed over again and again, with numbers and times that go on.
+
+    A run is handed over once: a robot that is back at its start of a sudden is another problem.
 
     A stream then sees one long recording, in which the robot is back at its start now and then. A detector that looks
     up the truth must get the old numbers again, which alone have one: not ``renumbered``.
 
     Parameters
     ----------
-    capture : Capture
+    capture : Capture or Drive
         Received, of one frame or more.
     frames : int
         So many in all.
@@ -64,11 +78,13 @@ def laps(capture: Capture, frames: int, *, renumbered: bool = True) -> tuple[Cap
 
     Returns
     -------
-    source : Capture
+    source : Capture or Drive
         To take frames from, one by one.
     numbers : list of int
         Those that it has, in order.
     """
+    if not isinstance(capture, Capture):
+        return capture, list(range(min(frames, len(capture))))
     if renumbered:
         return _again(capture, frames), list(range(frames))
     return capture, [number % len(capture) for number in range(frames)]
@@ -78,6 +94,8 @@ def _again(capture: Capture, frames: int) -> Capture:
     parts: dict[str, Any] = {name: _Again(getattr(capture, name), frames) for name in _SAMPLES if _has(capture, name)}
     lap, place = np.divmod(np.arange(frames), len(capture))
     parts |= {name: getattr(capture, name)[place] for name in PER_FRAME if _has(capture, name)}
+    if capture.anchors is not None:
+        parts["anchors"] = capture.anchors.of_frames(place)
     track = capture.trajectory
     lap_s = float(track.timestamp_s[-1] - track.timestamp_s[0]) + 1 / capture.radar.frame_rate_hz
     poses = Trajectory(track.timestamp_s[place] + lap * lap_s, track.position_m[place], track.yaw_rad[place])

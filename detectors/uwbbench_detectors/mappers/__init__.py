@@ -1,0 +1,1 @@
+"""Mappers: poses and maps from what the receivers of a robot find."""
