@@ -1,0 +1,1 @@
+"""Back ends that make poses and maps of what front ends detect."""
