@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from uwbbench.api import COLUMNS, Detections
+from uwbbench.api import COLUMNS, Detections, Map, Mapped, Poses
 
 
 def test_a_column_that_nobody_computed_reads_as_nan():
@@ -90,3 +90,10 @@ def test_hand_outs_stay_with_the_rows_and_processed_frames_must_match():
     with pytest.raises(ValueError, match="2 frames answered, but 3 processed"):
         found.with_hand_outs([3, 2], [0, 1])
     assert found.annotated(processed=np.array([1, 2])).answered is None
+
+
+def test_poses_and_map_stay_with_the_rows():
+    mapped = Mapped(Poses.of_one(0, np.zeros(3)), Map())
+    found = Detections([1, 2], range_m=[1.0, 2.0]).annotated(mapped=mapped)
+    assert Detections([1]).mapped is None
+    assert found.take(np.array([True, False])).with_columns(tap=[3.0]).annotated(notes=["n"]).mapped is mapped

@@ -14,6 +14,8 @@ from uwbbench.api.arrays import BoolArray, FloatArray, IntArray
 if TYPE_CHECKING:
     import pandas as pd
 
+    from uwbbench.api.mapper import Mapped
+
 COLUMNS = (
     "frame",
     "delay_s",
@@ -74,6 +76,7 @@ class Detections:
     """
 
     _answered: IntArray | None = None
+    _mapped: Mapped | None = None
 
     def __init__(
         self,
@@ -226,6 +229,11 @@ class Detections:
         return self._answered
 
     @property
+    def mapped(self) -> Mapped | None:
+        """Poses and map that a mapper made of these rows, those of all its front ends; None of a plain detector."""
+        return self._mapped
+
+    @property
     def candidates(self) -> Detections | None:
         """Every peak before the filters, found on demand; None where the detector does not give them."""
         if callable(self._candidates):
@@ -271,6 +279,7 @@ class Detections:
         notes: Sequence[str] | None = None,
         candidates: Detections | Callable[[], Detections] | None = None,
         chain: Mapping[str, int] | Callable[[], Mapping[str, int]] | None = None,
+        mapped: Mapped | None = None,
     ) -> Detections:
         """Return the same rows with other facts about them; what is not given stays.
 
@@ -285,6 +294,8 @@ class Detections:
             Every peak before the filters, or a function that finds them on demand.
         chain : mapping or callable, optional
             Detections left behind each step of the pipeline, in order, or a function that counts them.
+        mapped : Mapped, optional
+            Poses and map that a mapper made of these rows.
         """
         made = self._with(self._columns)
         if processed is not None:
@@ -295,6 +306,8 @@ class Detections:
             made._candidates = candidates
         if chain is not None:
             made._chain = chain
+        if mapped is not None:
+            made._mapped = mapped
         return made
 
     def _with(self, columns: dict[str, NDArray[Any]] | _Table) -> Detections:
@@ -303,7 +316,7 @@ class Detections:
         made._columns = columns
         made._processed, made._unsorted = self._processed, self._unsorted
         made._notes, made._candidates, made._chain = self._notes, self._candidates, self._chain
-        made._answered = self._answered
+        made._answered, made._mapped = self._answered, self._mapped
         return made
 
     @staticmethod

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import hashlib
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -12,6 +13,7 @@ import numpy as np
 from uwbbench.api.arrays import FloatArray, IntArray, locked
 from uwbbench.api.capture import Capture, CaptureHeader
 from uwbbench.api.errors import CaptureError
+from uwbbench.api.frames import Frames
 from uwbbench.api.geometry import wrap_angle
 from uwbbench.api.radar import Radar
 from uwbbench.api.truth import Trajectory
@@ -61,6 +63,16 @@ class Drive:
         return len(self.time_s)
 
     @property
+    def radar(self) -> Radar:
+        """Radar of the first receiver."""
+        return self.captures[0].radar
+
+    @property
+    def trajectory(self) -> Trajectory:
+        """True poses at the steps."""
+        return self.header.trajectory
+
+    @property
     def radars(self) -> dict[str, Radar]:
         """Radar of each receiver."""
         return {capture.radar.receiver: capture.radar for capture in self.captures}
@@ -70,16 +82,41 @@ class Drive:
         """Time of each step (steps,)."""
         return locked(np.unique(np.concatenate([capture.trajectory.timestamp_s for capture in self.captures])))
 
-    def steps_of(self, capture: Capture) -> IntArray:
-        """Step (frames,) of each frame of one of the captures."""
-        return np.searchsorted(self.time_s, capture.trajectory.timestamp_s)
+    def frames(self, start: int = 0, stop: int | None = None, *, sts: bool = True) -> dict[str, Frames]:
+        """Frames of each receiver in the steps ``start`` to ``stop``; receivers without any are left out.
+
+        Parameters
+        ----------
+        start, stop : int
+            First step, and the one behind the last; to the end where left out.
+        sts : bool
+            Read the STS responses, where a receiver has them.
+        """
+        blocks = {}
+        for capture in self.captures:
+            steps = self.steps[capture.radar.receiver]
+            first, last = np.searchsorted(steps, (start, len(self) if stop is None else stop))
+            if last > first:
+                blocks[capture.radar.receiver] = capture.frames(int(first), int(last), sts=sts)
+        return blocks
+
+    def blocks(self, size: int, *, sts: bool = True) -> Iterator[dict[str, Frames]]:
+        """Frames in consecutive blocks of ``size`` steps; the last may be shorter. ``sts`` as in :meth:`frames`."""
+        for start in range(0, len(self), size):
+            yield self.frames(start, start + size, sts=sts)
+
+    @cached_property
+    def steps(self) -> dict[str, IntArray]:
+        """Step (frames,) of each frame of each receiver."""
+        times = {capture.radar.receiver: capture.trajectory.timestamp_s for capture in self.captures}
+        return {name: locked(np.searchsorted(self.time_s, time_s)) for name, time_s in times.items()}
 
     @cached_property
     def odometry(self) -> FloatArray:
         """x, y and yaw (steps, 3) as odometry has them; of the first receiver that has a frame then."""
         poses = np.empty((len(self), 3))
         for capture in reversed(self.captures):
-            poses[self.steps_of(capture)] = odometry_of(capture)
+            poses[self.steps[capture.radar.receiver]] = odometry_of(capture)
         return locked(poses)
 
     @cached_property
@@ -90,12 +127,16 @@ class Drive:
             steps[1:] = relative(self.odometry[:-1], self.odometry[1:])
         return locked(steps)
 
+    def __repr__(self) -> str:
+        receivers = ", ".join(self.radars)
+        return f"Drive({self.name!r}: {len(self)} steps of {receivers}, {self.header.duration_s:.2f} s)"
+
     @cached_property
     def header(self) -> CaptureHeader:
         """The run without samples: truth, true poses at the steps, and the radar of the first receiver."""
         position_m, yaw_rad = np.empty((len(self), 3)), np.empty(len(self))
         for capture in reversed(self.captures):
-            steps = self.steps_of(capture)
+            steps = self.steps[capture.radar.receiver]
             position_m[steps], yaw_rad[steps] = capture.trajectory.position_m, capture.trajectory.yaw_rad
         first = self.captures[0].header
         trajectory = Trajectory(self.time_s, position_m, yaw_rad)
@@ -103,7 +144,9 @@ class Drive:
 
     @cached_property
     def sha256(self) -> str:
-        """Of the content of all captures, in order."""
+        """Of the content of all captures, in order; of a single one that of the capture."""
+        if len(self.captures) == 1:
+            return self.captures[0].sha256
         text = "\n".join(f"{capture.radar.receiver} {capture.sha256}" for capture in self.captures)
         return hashlib.sha256(text.encode()).hexdigest()
 

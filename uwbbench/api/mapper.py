@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import ClassVar, Generic, Literal, get_args
+from typing import Any, ClassVar, Generic, Literal, get_args
 
 import numpy as np
 
@@ -86,6 +86,13 @@ class Poses:
     def none(cls) -> Poses:
         """No pose."""
         return cls(np.zeros(0, np.int64), np.zeros((0, 3)))
+
+    def records(self) -> list[dict[str, Any]]:
+        """Poses as plain values, one mapping for each: what a program without arrays reads."""
+        names = ("step", "x_m", "y_m", "yaw_rad")
+        return [
+            dict(zip(names, row, strict=True)) for row in zip(self.index.tolist(), *self.pose.T.tolist(), strict=True)
+        ]
 
     @staticmethod
     def join(parts: list[Poses]) -> Poses:

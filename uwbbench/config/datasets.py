@@ -17,7 +17,7 @@ from uwbbench.api.yaml_file import YamlFile
 from uwbbench.config.extends import placed
 from uwbbench.config.model import ConfigModel
 from uwbbench.config.rules import RegionModel
-from uwbbench.config.source import CaptureRef, open_dataset
+from uwbbench.config.source import CaptureRef, RunRef, open_dataset
 
 
 class DatasetUse(ConfigModel):
@@ -156,6 +156,23 @@ class DatasetSource:
         if self.at_most is not None and self.at_most < len(chosen):
             chosen = [chosen[place * len(chosen) // self.at_most] for place in range(self.at_most)]
         return [CaptureRef(self.use, self.params, self.roots, name, self.secret) for name in chosen]
+
+    def runs(self) -> list[RunRef]:
+        """References to the runs that chosen captures belong to, each with those of its captures that are chosen.
+
+        Raises
+        ------
+        CaptureError
+            As :meth:`references`.
+        """
+        chosen = {ref.name for ref in self.references()}
+        dataset = open_dataset(self.use, self.params, [Path(root) for root in self.roots])
+        runs = {name: tuple(c for c in captures if c in chosen) for name, captures in dataset.runs().items()}
+        return [
+            RunRef(self.use, self.params, self.roots, name, captures, self.secret)
+            for name, captures in runs.items()
+            if captures
+        ]
 
 
 def _fits(name: str, patterns: tuple[str, ...]) -> bool:

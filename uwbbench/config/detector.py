@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
-from collections.abc import Mapping
+import dataclasses
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
@@ -17,7 +16,9 @@ from uwbbench.api.errors import ConfigError, PluginError, nearest
 from uwbbench.api.locate import find_config
 from uwbbench.api.override import with_values
 from uwbbench.api.yaml_file import YamlFile, parse_yaml, read_yaml
-from uwbbench.config.extends import extended
+from uwbbench.config.extends import extended, placed
+from uwbbench.config.identity import RESULTS_FILE
+from uwbbench.config.mapper import MapperModel, MapperUse, check_mapper
 from uwbbench.config.reported import ReportedFigures
 from uwbbench.config.weights import anchored_weights, portable_weights
 
@@ -64,6 +65,9 @@ class DetectorModel(BaseModel):
     extends: str | None = Field(None, description="Detector (name or file) that this one changes.")
     set: dict[str, Any] = Field(default_factory=dict, description="Values to change in the extended detector, by path.")
     pipeline: list[StepModel] = Field(min_length=1)
+    mapper: MapperModel | None = Field(
+        None, description="What makes poses and a map of a run; the pipeline is then the front end of each receiver."
+    )
 
 
 @dataclass(frozen=True)
@@ -129,6 +133,10 @@ class DetectorConfig:
         What is in it counts, not where it is: it is no part of the resolved file.
     reported : tuple of ReportedFigures
         What the source of the method reports of it; no part of the resolved file either.
+    mapper : MapperUse or None
+        What makes poses and a map of a run; the steps are then the front end of each receiver.
+    fronts : dict of tuples of Step
+        Steps of the receivers whose front end differs; no part of the resolved file, whose mapper says how it does.
     """
 
     name: str
@@ -139,6 +147,12 @@ class DetectorConfig:
     score: str = ""
     results: Path | None = field(default=None, compare=False)
     reported: tuple[ReportedFigures, ...] = field(default=(), compare=False)
+    mapper: MapperUse | None = None
+    fronts: dict[str, tuple[Step, ...]] = field(default_factory=dict, compare=False, repr=False)
+
+    def front(self, receiver: str) -> DetectorConfig:
+        """Front end of a receiver of a run: a detector without the mapper."""
+        return dataclasses.replace(self, steps=self.fronts.get(receiver, self.steps), mapper=None, fronts={})
 
     @classmethod
     def of_results(cls, name: str, folder: Path) -> DetectorConfig:
@@ -157,26 +171,12 @@ class DetectorConfig:
             for s in self.steps
         ]
         score = {"score": self.score} if self.score else {}
-        return {"schema": 1, "name": self.name, "fidelity": self.fidelity, **score, "pipeline": steps}
+        mapper = {} if self.mapper is None else {"mapper": self.mapper.to_dict()}
+        return {"schema": 1, "name": self.name, "fidelity": self.fidelity, **score, "pipeline": steps, **mapper}
 
-
-KERNEL = "kernel "
-"""What the names of kernels begin with among the names of sources."""
 
 REFERENCE = "reference"
 """Fidelity of what stands beside detectors for comparison."""
-
-RESULTS_FILE = "results file"
-"""Fidelity of a detector that is known by what it has written alone, and how tables mark its rows."""
-
-RESULTS = "results of "
-"""What the names of such detectors begin with among the names of sources."""
-
-
-def from_results(config: Mapping[str, Any]) -> bool:
-    """Whether a resolved detector is known by what it has written alone."""
-    return bool(config.get("fidelity") == RESULTS_FILE)
-
 
 BOUND = "bound"
 """How tables mark the rows of what is no detector, but bounds what detectors can reach."""
@@ -184,7 +184,10 @@ BOUND = "bound"
 
 def is_bound(config: DetectorConfig) -> bool:
     """Whether it only bounds what detectors can reach: it or a stage of it is a reference, or reads the truth."""
-    stages = [registry.load_plugin("stages", step.use) for step in config.steps]
+    steps = [step for steps in (config.steps, *config.fronts.values()) for step in steps]
+    stages = [registry.load_plugin("stages", step.use) for step in steps]
+    if config.mapper is not None:
+        stages.append(registry.load_plugin("mappers", config.mapper.use))
     seeing = any("truth" in stage.needs or stage.fidelity == REFERENCE for stage in stages)
     return seeing or config.fidelity == REFERENCE
 
@@ -202,28 +205,6 @@ def marked(name: str, *, results_file: bool = False, bound: bool = False) -> str
     """
     marks = [*([RESULTS_FILE] if results_file else []), *([BOUND] if bound else [])]
     return f"{name} ({', '.join(marks)})" if marks else name
-
-
-def detector_identity(config: Mapping[str, Any], sources: Mapping[str, str]) -> str:
-    """SHA-256 over a resolved detector and the sources of its stages.
-
-    Parameters
-    ----------
-    config : mapping
-        As :meth:`DetectorConfig.to_dict` gives it.
-    sources : mapping of str to str
-        SHA-256 of the sources of each stage by its name, and of each kernel, which may stand for some, by its name
-        behind ``KERNEL``. Those of other stages do not count. For a detector that is known by what it has written
-        alone: SHA-256 of that by its name behind ``RESULTS``, and nothing else.
-    """
-    if from_results(config):
-        name = f"{RESULTS}{config['name']}"
-        used = {name: sources[name]}
-    else:
-        used = {step["use"]: sources[step["use"]] for step in config["pipeline"]}
-        used |= {name: sha256 for name, sha256 in sources.items() if name.startswith(KERNEL)}
-    text = json.dumps({"detector": config, "sources": used}, sort_keys=True)
-    return hashlib.sha256(text.encode()).hexdigest()
 
 
 def read_detector(
@@ -264,8 +245,35 @@ def check_detector(data: Mapping[str, Any], source: YamlFile) -> DetectorConfig:
     model = checked(DetectorModel, data, source)
     if model.set:
         raise ConfigError(f"{source.place(('set',))}: 'set' changes an extended detector, but 'extends' is missing")
+    steps = _checked_steps(model.pipeline, source)
+    for place, figures in enumerate(model.reported):
+        for at, name in enumerate(figures.metrics):
+            if name not in registry.entries("metrics"):
+                where = source.place(("reported", place, "metrics", at))
+                raise ConfigError(f"{where}: no metric '{name}'.{nearest(name, registry.entries('metrics'))}")
+    _check_score(model.score, steps, source)
+    about = model.description, model.citation, model.fidelity
+    mapper = check_mapper(model.mapper, source)
+    fronts = {} if mapper is None else {name: _front(name, mapper, data, source) for name in mapper.front}
+    return DetectorConfig(
+        model.name, steps, *about, model.score or "", reported=tuple(model.reported), mapper=mapper, fronts=fronts
+    )
+
+
+def _front(receiver: str, mapper: MapperUse, data: Mapping[str, Any], source: YamlFile) -> tuple[Step, ...]:
+    """Steps of a receiver whose front end differs."""
+    at = ("mapper", "front", receiver)
+    changes = {f"pipeline.{path}": value for path, value in mapper.front[receiver].items()}
+    with placed(source, at):
+        changed = with_values({"pipeline": data["pipeline"]}, changes, source.place(at))
+        model = checked(DetectorModel, {**data, **changed}, source)
+        return _checked_steps(model.pipeline, source)
+
+
+def _checked_steps(pipeline: list[StepModel], source: YamlFile) -> tuple[Step, ...]:
+    """Steps of a pipeline; every stage is looked up and every parameter checked."""
     steps: list[Step] = []
-    for index, item in enumerate(model.pipeline):
+    for index, item in enumerate(pipeline):
         label = item.label or item.use
         if label in {step.label for step in steps}:
             raise ConfigError(
@@ -276,15 +284,7 @@ def check_detector(data: Mapping[str, Any], source: YamlFile) -> DetectorConfig:
         _check_unless(step, steps)
         _check_params(step, source, index)
         steps.append(step)
-    steps = _completed(steps)
-    for place, figures in enumerate(model.reported):
-        for at, name in enumerate(figures.metrics):
-            if name not in registry.entries("metrics"):
-                where = source.place(("reported", place, "metrics", at))
-                raise ConfigError(f"{where}: no metric '{name}'.{nearest(name, registry.entries('metrics'))}")
-    _check_score(model.score, steps, source)
-    about = model.description, model.citation, model.fidelity
-    return DetectorConfig(model.name, tuple(steps), *about, model.score or "", reported=tuple(model.reported))
+    return tuple(_completed(steps))
 
 
 def _check_unless(step: Step, before: list[Step]) -> None:
@@ -297,7 +297,7 @@ def _check_unless(step: Step, before: list[Step]) -> None:
         raise ConfigError(f"{step.place}: unless: no optional step '{step.unless}' before '{step.label}'.{known}")
 
 
-def _check_score(score: str | None, steps: list[Step], source: YamlFile) -> None:
+def _check_score(score: str | None, steps: Sequence[Step], source: YamlFile) -> None:
     """Check that a step makes the column that orders candidates."""
     made = {port for step in steps for port in registry.load_plugin("stages", step.use).produces}
     parts = {"first_path", "noise", "profile", "aligned", "window_mean", "window_sd", "detections", "cluster"}

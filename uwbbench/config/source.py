@@ -12,6 +12,7 @@ from uwbbench.api import registry
 from uwbbench.api.capture import Capture
 from uwbbench.api.check import checked
 from uwbbench.api.dataset import Dataset
+from uwbbench.api.drive import Drive
 from uwbbench.api.yaml_file import Path_, YamlFile
 
 
@@ -115,3 +116,37 @@ class CaptureRef:
         params = {"files": [str(absolute)], **({"receiver": receiver} if receiver else {})}
         name = absolute.stem if receiver is None else f"{absolute.stem}/{receiver}"
         return cls(registry.default("dataset.files"), params, (str(absolute.parent),), name)
+
+
+@dataclass(frozen=True)
+class RunRef:
+    """Captures of a run that can be opened together, here or in another process.
+
+    Attributes
+    ----------
+    dataset, params, roots, secret
+        As of a :class:`CaptureRef`.
+    name : str
+        Name of the run in the dataset.
+    captures : tuple of str
+        Names of its captures that are taken.
+    """
+
+    dataset: str
+    params: dict[str, Any]
+    roots: tuple[str, ...]
+    name: str
+    captures: tuple[str, ...]
+    secret: dict[str, Any] = field(default_factory=dict, repr=False)
+
+    def open(self) -> Drive:
+        """Open the captures, merged by time.
+
+        Raises
+        ------
+        CaptureError
+            If files are missing or broken, or the captures do not fit together.
+        """
+        params = {**self.params, **self.secret}
+        dataset = open_dataset(self.dataset, params, [Path(root) for root in self.roots])
+        return dataset.open_run(self.name, self.captures)

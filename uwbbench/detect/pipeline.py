@@ -19,7 +19,8 @@ from uwbbench.api.learning import LearnedParams
 from uwbbench.api.radar import Radar
 from uwbbench.api.stage import Stage
 from uwbbench.api.weights import load_weights
-from uwbbench.config.detector import KERNEL, DetectorConfig, Step, detector_from_text, detector_identity, read_detector
+from uwbbench.config.detector import DetectorConfig, Step, detector_from_text, read_detector
+from uwbbench.config.identity import KERNEL, MAPPER, detector_identity
 from uwbbench.config.weights import portable_weights
 from uwbbench.detect.hand_out import with_hand_outs
 from uwbbench.detect.opening import Chosen, background_of, opened
@@ -103,8 +104,13 @@ class Pipeline:
         Raises
         ------
         ConfigError
-            If the capture lacks what a stage needs and the stage is not optional.
+            If the capture lacks what a stage needs and the stage is not optional, or the detector has a mapper.
         """
+        if self.config.mapper is not None:
+            raise ConfigError(
+                f"detector '{self.name}' answers for a run with poses and a map, not for single captures; "
+                "'uwbbench run' with the scorings pose and map runs it"
+            )
         steps, notes = self._opened(capture)
         if fused and not audit:
             steps = _fused(steps, notes, threads)
@@ -278,9 +284,11 @@ class Pipeline:
     @property
     def sources(self) -> dict[str, str]:
         """SHA-256 of the sources of each stage, and of the kernels that may stand for some, by name."""
-        hashes = {
-            step.use: source_hash(registry.load_plugin("stages", step.use).__module__) for step in self.config.steps
-        }
+        steps = [step for steps in (self.config.steps, *self.config.fronts.values()) for step in steps]
+        hashes = {step.use: source_hash(registry.load_plugin("stages", step.use).__module__) for step in steps}
+        if self.config.mapper is not None:
+            used = self.config.mapper.use
+            hashes[f"{MAPPER}{used}"] = source_hash(registry.load_plugin("mappers", used).__module__)
         for name in registry.entries("kernels"):
             with contextlib.suppress(PluginError):  # one that cannot be loaded is not used
                 hashes[f"{KERNEL}{name}"] = source_hash(registry.load_plugin("kernels", name).__module__)

@@ -37,7 +37,7 @@ from uwbbench.api.errors import ScoringError
 from uwbbench.api.frames import BATCH_FRAMES
 from uwbbench.api.geometry import SPEED_OF_LIGHT_M_S, bistatic_range, direction
 from uwbbench.api.radar import Radar
-from uwbbench.config.detector import RESULTS_FILE
+from uwbbench.config.identity import RESULTS_FILE
 from uwbbench.detect.number_table import NumberTable, read_table
 
 SUFFIXES = (".csv", ".parquet")

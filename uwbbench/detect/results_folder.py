@@ -8,7 +8,8 @@ from pathlib import Path
 
 from uwbbench.api.capture import Capture
 from uwbbench.api.errors import ScoringError, nearest
-from uwbbench.config.detector import RESULTS, DetectorConfig, detector_identity
+from uwbbench.config.detector import DetectorConfig
+from uwbbench.config.identity import RESULTS, detector_identity
 from uwbbench.detect.results_file import SUFFIXES, ResultsFile, content_of, read_results
 
 

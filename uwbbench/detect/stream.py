@@ -42,6 +42,8 @@ class Stream:
     chain : dict
         Detections left behind each step, in order. Not counted where kernels are at work, which describe no detection
         that will be dropped.
+    answered : int
+        Frames that it has answered for, from the first on; a frame behind them is held back, or was not given yet.
     """
 
     def __init__(self, steps: list[Opened], notes: Sequence[str], *, audit: bool = False) -> None:
@@ -53,6 +55,7 @@ class Stream:
         self._kernel = steps[0].stage if steps and isinstance(steps[0].stage, Kernel) else None
         self._counts = not any(isinstance(step.stage, Kernel) for step in steps)
         self._noted: tuple[int, tuple[str, ...]] = (-1, ())
+        self.answered = 0
         self.chain: dict[str, int] = {}
 
     def step(self, frames: Frames) -> Detections:
@@ -72,6 +75,7 @@ class Stream:
             return self._emit(self.through(Block(frames.without_invalid())))
         detections = self._kernel.detect(frames, None)
         if len(self._steps) == 1:
+            self.answered = frames.first + len(frames)
             return detections
         return self._emit(self.through(Block(frames.without_invalid(), detections=detections), 1))
 
@@ -140,6 +144,7 @@ class Stream:
                 yield self.through(tail, index + 1)
 
     def _emit(self, block: Block) -> Detections:
+        self.answered = max(self.answered, block.frames.first + len(block.frames))
         return block.detections.annotated(processed=(block.frames.first, block.frames.valid), notes=self.notes)
 
     def through(self, block: Block, start: int = 0) -> Block:

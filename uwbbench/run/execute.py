@@ -20,7 +20,8 @@ from joblib import Parallel, delayed
 
 from uwbbench.api.errors import StoreError, UwbbenchError
 from uwbbench.api.interruption import by_plugin, listening
-from uwbbench.config.detector import DetectorConfig, detector_identity, is_bound, read_detector
+from uwbbench.config.detector import DetectorConfig, is_bound, read_detector
+from uwbbench.config.identity import detector_identity
 from uwbbench.config.seeds import HIDDEN
 from uwbbench.detect.pipeline import Pipeline
 from uwbbench.detect.results_folder import ResultsFolder
@@ -252,8 +253,10 @@ class _Run:
 
     @property
     def _examinable(self) -> tuple[DetectorConfig, ...]:
-        """Detectors to examine with the hard cases."""
-        return self.experiment.runnable if self.experiment.stability else ()
+        """Detectors to examine with the hard cases, which are single captures."""
+        if not self.experiment.stability:
+            return ()
+        return tuple(detector for detector in self.experiment.runnable if detector.mapper is None)
 
     def _unexamined(self, before: dict[str, Entry]) -> list[DetectorConfig]:
         """Detectors whose stability is not known, or has changed with their sources."""

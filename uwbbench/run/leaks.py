@@ -7,13 +7,14 @@ from dataclasses import dataclass, field
 
 from uwbbench.api import registry
 from uwbbench.api.capture import Capture
+from uwbbench.api.drive import Drive
 from uwbbench.api.errors import ConfigError
 from uwbbench.api.interruption import by_plugin
 from uwbbench.api.learning import LearnedParams
 from uwbbench.api.recording import leak_key
 from uwbbench.api.weights import LearnedFrom, read_weights
 from uwbbench.config.detector import BY_CHANNEL, DetectorConfig, Step
-from uwbbench.config.source import CaptureRef
+from uwbbench.config.source import CaptureRef, RunRef
 
 
 @dataclass
@@ -58,7 +59,7 @@ def trained_on(detector: DetectorConfig) -> Known:
         If weights cannot be read.
     """
     known = Known()
-    for step in detector.steps:
+    for step in (*detector.steps, *(step for steps in detector.fronts.values() for step in steps)):
         for one in _learned_from(step):
             known.add(f"{one.dataset}: {one.capture}", one.sha256, one.recording)
     return known
@@ -75,14 +76,14 @@ def _learned_from(step: Step) -> Iterable[LearnedFrom]:
 
 
 def refuse_trained_on(
-    detectors: Iterable[DetectorConfig], captures: Iterable[tuple[str, Capture | CaptureRef]]
+    detectors: Iterable[DetectorConfig], captures: Iterable[tuple[str, Capture | CaptureRef | RunRef]]
 ) -> None:
     """Refuse to score detectors on captures that share content, recording or draws with what they were trained on.
 
     Parameters
     ----------
     detectors : iterable of DetectorConfig
-    captures : iterable of (str, Capture or CaptureRef)
+    captures : iterable of (str, Capture, CaptureRef or RunRef)
         With a name for people; opened only where a detector has learned anything.
 
     Raises
@@ -96,13 +97,14 @@ def refuse_trained_on(
     found: dict[str, list[str]] = {}
     for name, given in captures:
         try:
-            capture = given.open() if isinstance(given, CaptureRef) else given
+            opened = given if isinstance(given, Capture) else given.open()
         except BaseException as error:
             if not by_plugin(error):
                 raise
             continue  # it will fail in the same way where it is to be scored, and say so
         for detector, known in learned.items():
-            if (other := known.same(capture)) is not None:
+            others = map(known.same, opened.captures if isinstance(opened, Drive) else (opened,))
+            if (other := next(filter(None, others), None)) is not None:
                 found.setdefault(detector, []).append(f"'{name}' (there '{other}')")
     for detector, pairs in found.items():
         more = f" and {len(pairs) - 3} more" if len(pairs) > 3 else ""

@@ -9,7 +9,7 @@ from uwbbench.api.errors import CaptureError
 from uwbbench.api.interruption import by_plugin
 from uwbbench.api.text import one_line
 from uwbbench.config.detector import DetectorConfig
-from uwbbench.config.source import CaptureRef
+from uwbbench.config.source import CaptureRef, RunRef
 from uwbbench.run.experiment import Experiment
 from uwbbench.run.folder.identity import capture_name, listing_name, unit_name
 from uwbbench.run.folder.journal import Entry
@@ -27,13 +27,14 @@ class Unit:
     detector : DetectorConfig
     dataset : str
         Label of the dataset.
-    ref : CaptureRef
+    ref : CaptureRef or RunRef
+        A run where the detector has a mapper.
     """
 
     kind: Literal["accuracy", "latency"]
     detector: DetectorConfig
     dataset: str
-    ref: CaptureRef
+    ref: CaptureRef | RunRef
 
     @property
     def id(self) -> str:
@@ -43,7 +44,10 @@ class Unit:
     @property
     def capture_id(self) -> str:
         """File name of the capture's header."""
-        return capture_name(self.ref.dataset, self.ref.params, self.ref.name)
+        ref, params = self.ref, self.ref.params
+        if isinstance(ref, RunRef) and ref.captures != (ref.name,):
+            params = {**params, "run": list(ref.captures)}
+        return capture_name(ref.dataset, params, ref.name)
 
 
 @dataclass(frozen=True)
@@ -82,11 +86,14 @@ def plan(experiment: Experiment) -> Plan:
     scenes: dict[str, dict[str, str]] = {}
     skipped: dict[str, str] = {}
     for source in experiment.datasets:
+        chosen = [d for d in experiment.detectors if not source.detectors or d.name in source.detectors]
         try:
             references = source.references()
+            runs: list[RunRef] = source.runs() if any(d.mapper for d in chosen) else []
             if source.optional:
                 references[0].open()
             scenes[source.label] = source.scenes([ref.name for ref in references])
+            scenes[source.label] |= {run.name: run.name for run in runs}
         except BaseException as error:  # an adapter may raise anything; the other datasets still run
             if not by_plugin(error):
                 raise
@@ -108,11 +115,15 @@ def plan(experiment: Experiment) -> Plan:
         if experiment.frozen is not None and not source.optional:
             names = [ref.name for ref in references]
             experiment.frozen.check_names(source.label, names, all_of_them=not experiment.part.quick)
-        chosen = [d for d in experiment.detectors if not source.detectors or d.name in source.detectors]
-        accuracy += [Unit("accuracy", d, source.label, ref) for ref in references for d in chosen]
-        timed = references if experiment.latency.captures == "all" else references[:1]
+        single = [d for d in chosen if d.mapper is None]
+        mapping = [d for d in chosen if d.mapper is not None]
+        pairs: list[tuple[CaptureRef | RunRef, DetectorConfig]] = [(ref, d) for ref in references for d in single]
+        pairs += [(run, d) for run in runs for d in mapping]
+        accuracy += [Unit("accuracy", d, source.label, ref) for ref, d in pairs]
         if source.timed:
-            latency += [Unit("latency", d, source.label, ref) for ref in timed for d in chosen if d.results is None]
+            first = {references[0].name, *(run.name for run in runs[:1])}
+            timed = [(ref, d) for ref, d in pairs if experiment.latency.captures == "all" or ref.name in first]
+            latency += [Unit("latency", d, source.label, ref) for ref, d in timed if d.results is None]
     return Plan(tuple(accuracy + (latency if experiment.latency.enabled else [])), tuple(failures), scenes, skipped)
 
 

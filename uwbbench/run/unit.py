@@ -13,9 +13,12 @@ from typing import Any
 from uwbbench.api.arrays import FloatArray
 from uwbbench.api.capture import Capture, CaptureHeader
 from uwbbench.api.detections import HANDED_OUT, Detections
+from uwbbench.api.drive import Drive
 from uwbbench.api.interruption import by_plugin, leave_to_parent
-from uwbbench.config.detector import RESULTS_FILE, DetectorConfig
-from uwbbench.config.source import CaptureRef
+from uwbbench.config.detector import DetectorConfig
+from uwbbench.config.identity import RESULTS_FILE
+from uwbbench.config.source import CaptureRef, RunRef
+from uwbbench.detect.mapping import MappingPipeline
 from uwbbench.detect.pipeline import Pipeline
 from uwbbench.detect.results_file import ResultsFile
 from uwbbench.detect.results_folder import ResultsFolder
@@ -79,26 +82,26 @@ class Finished:
     times_us: FloatArray | None = None
 
 
-_last: list[tuple[str, CaptureRef, Capture]] = []
+_last: list[tuple[str, CaptureRef | RunRef, Capture | Drive]] = []
 
 
-def _opened(session: str, ref: CaptureRef) -> Capture:
-    """Capture of a reference; the last one is kept, as the units of a capture follow each other."""
+def _opened(session: str, ref: CaptureRef | RunRef) -> Capture | Drive:
+    """Capture or run of a reference; the last one is kept, as the units of a capture follow each other."""
     if not (_last and _last[0][:2] == (session, ref)):
         _last[:] = [(session, ref, ref.open())]
     return _last[0][2]
 
 
-_pipelines: dict[tuple[str, str], tuple[Pipeline, str]] = {}
+_pipelines: dict[tuple[str, str], tuple[Pipeline | MappingPipeline, str]] = {}
 
 
-def _checked(session: str, detector: DetectorConfig) -> tuple[Pipeline, str]:
+def _checked(session: str, detector: DetectorConfig) -> tuple[Pipeline | MappingPipeline, str]:
     """Pipeline of a detector with its identity, for which all sources are read; kept as long as the run lasts."""
     known = _pipelines.get((session, detector.name))
     if known is None:
         for old in [key for key in _pipelines if key[0] != session]:
             del _pipelines[old]
-        pipeline = Pipeline(detector)
+        pipeline = Pipeline(detector) if detector.mapper is None else MappingPipeline(detector)
         known = _pipelines[session, detector.name] = pipeline, pipeline.identity
     return known
 
@@ -149,14 +152,14 @@ def run_unit(job: Job) -> Finished:
 def _detected(job: Job) -> Finished:
     unit = job.unit
     capture = _opened(job.session, unit.ref)
-    if job.frozen is not None:
+    if job.frozen is not None and isinstance(capture, Capture):
         job.frozen.check(unit.dataset, unit.ref.name, capture)
+    stored, results = None, dict[str, Any]()
     if unit.detector.results is None:
         pipeline, identity = _checked(job.session, unit.detector)
-        # Kernels count nothing that they drop, so a second pass tells; plain stages do so in the first.
-        detections = pipeline.run(capture, candidates=not pipeline.open(capture).fused, handed_out=True)
-        stored, results = None, dict[str, Any]()
+        detections = _found(pipeline, capture)
     else:
+        assert isinstance(capture, Capture)  # noqa: S101 - what another program has found is of captures
         stored, results = _read(unit, capture)
         detections, identity = stored.detections, ResultsFolder(unit.detector).identity(stored.sha256)
     header = capture.header
@@ -198,6 +201,16 @@ def _detected(job: Job) -> Finished:
     )
 
 
+def _found(pipeline: Pipeline | MappingPipeline, capture: Capture | Drive) -> Detections:
+    """What a detector finds on a capture, or a mapper's on a run."""
+    if isinstance(pipeline, MappingPipeline):
+        assert isinstance(capture, Drive)  # noqa: S101 - planned so
+        return pipeline.run(capture, handed_out=True)
+    assert isinstance(capture, Capture)  # noqa: S101
+    # Kernels count nothing that they drop, so a second pass tells; plain stages do so in the first.
+    return pipeline.run(capture, candidates=not pipeline.open(capture).fused, handed_out=True)
+
+
 def _read(unit: Unit, capture: Capture) -> tuple[ResultsFile, dict[str, Any]]:
     """What another program has found, and facts about its file; its times are summed up as reported."""
     folder = ResultsFolder(unit.detector)
@@ -234,5 +247,6 @@ def _bare(detections: Detections) -> Detections:
     """Detections without the means to find candidates later, which would drag the capture between processes."""
     columns: dict[str, Any] = detections.columns
     bare = Detections(**columns, processed=detections.processed, notes=detections.notes, chain=detections.chain)
+    bare = bare.annotated(mapped=detections.mapped)
     answered = detections.answered
     return bare if answered is None else bare.with_hand_outs(columns[HANDED_OUT], answered)

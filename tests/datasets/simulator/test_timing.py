@@ -185,3 +185,17 @@ def test_odometry_of_one_frame_is_its_pose(make_term, rng):
     seen = make_term("odometry").record(driven(np.zeros(1)), rng)
     assert seen.odometry_position_m.tolist() == [[3.0, -2.0, 0.1]]
     assert seen.odometry_yaw_rad.tolist() == [0.0]
+
+
+def test_one_number_of_drift_stands_for_all_three_errors(make_term):
+    capture = driven(WAYS["circles"])
+    one = make_term("odometry", drift=0.02).record(capture, np.random.default_rng(5))
+    three = make_term("odometry", distance_error=0.02, rotation_error=0.02, heading_noise_deg=1.0)
+    other = three.record(capture, np.random.default_rng(5))
+    assert np.array_equal(one.odometry_position_m, other.odometry_position_m)
+    assert np.array_equal(one.odometry_yaw_rad, other.odometry_yaw_rad)
+
+
+def test_drift_beside_an_error_that_it_stands_for_is_refused(make_term):
+    with pytest.raises(ValueError, match="drift stands for distance_error too"):
+        make_term("odometry", drift=0.02, distance_error=0.01)

@@ -14,7 +14,7 @@ import yaml
 
 from uwbbench.api.errors import UwbbenchError
 from uwbbench.config.detector import DetectorConfig, read_detector
-from uwbbench.config.source import CaptureRef
+from uwbbench.config.source import CaptureRef, RunRef
 from uwbbench.measure.latency.latency import Latency
 from uwbbench.measure.latency.settings import LatencyModel
 
@@ -36,12 +36,13 @@ class LatencyError(UwbbenchError):
     """A detector could not be timed."""
 
 
-def measure(ref: CaptureRef, detector: DetectorConfig, settings: LatencyModel | None = None) -> Latency:
+def measure(ref: CaptureRef | RunRef, detector: DetectorConfig, settings: LatencyModel | None = None) -> Latency:
     """Time a detector on a capture, in a fresh process with one thread on one core.
 
     Parameters
     ----------
-    ref : CaptureRef
+    ref : CaptureRef or RunRef
+        A run where the detector has a mapper; times are then of a step: of all frames of one moment.
     detector : DetectorConfig
     settings : LatencyModel, optional
 
@@ -60,7 +61,7 @@ def measure(ref: CaptureRef, detector: DetectorConfig, settings: LatencyModel | 
     reference = None if settings.reference is None else read_detector(settings.reference).here()
     spec: dict[str, Any] = {
         "detector": detector.here(),
-        "capture": {**asdict(ref), "roots": list(ref.roots)},
+        "capture": {name: list(value) if isinstance(value, tuple) else value for name, value in asdict(ref).items()},
         "frames": settings.frames,
         "warmup_windows": settings.warmup_windows,
         "blocks": settings.blocks,

@@ -20,10 +20,8 @@ from typing import Any
 import numpy as np
 
 from uwbbench.api.arrays import BoolArray, FloatArray
-from uwbbench.api.capture import Capture
 from uwbbench.api.frames import BATCH_FRAMES
-from uwbbench.detect.pipeline import Pipeline
-from uwbbench.detect.stream import Stream
+from uwbbench.measure.latency.played import Played, Stepping, Timed
 
 WINDOW_FRAMES = 200
 """Frames of one pass of a warm-up window, at most."""
@@ -83,13 +81,13 @@ class Pass:
     flush_us: float = 0.0
 
 
-def timed_calls(stream: Stream, frames: Capture, start: int, stop: int) -> Pass:
+def timed_calls(stream: Stepping, frames: Played, start: int, stop: int) -> Pass:
     """Time of single frames from raw samples to records, without a flush.
 
     Parameters
     ----------
-    stream : Stream
-    frames : Capture
+    stream : Stepping
+    frames : Played
         Received frames, in memory.
     start, stop : int
         First frame, and the one behind the last.
@@ -114,17 +112,17 @@ def timed_calls(stream: Stream, frames: Capture, start: int, stop: int) -> Pass:
     return Pass(times_ns * 1e-3, step_ns * 1e-3, clustered)
 
 
-def warm_up(pipeline: Pipeline, capture: Capture, frames: Capture, windows: int) -> bool:
+def warm_up(pipeline: Timed, capture: Played, frames: Played, windows: int) -> bool:
     """Run until two windows in a row agree; whether they did within the limit.
 
     Every pass is a stream of its own and is flushed, so that what a stage imports or compiles only then is warm too.
 
     Parameters
     ----------
-    pipeline : Pipeline
-    capture : Capture
+    pipeline : Timed
+    capture : Played
         That streams are opened for.
-    frames : Capture
+    frames : Played
         Received frames of it; the first ``WINDOW_FRAMES`` are used.
     windows : int
         Limit of their number.
@@ -138,7 +136,7 @@ def warm_up(pipeline: Pipeline, capture: Capture, frames: Capture, windows: int)
     return False
 
 
-def _window_us(pipeline: Pipeline, capture: Capture, frames: Capture) -> float:
+def _window_us(pipeline: Timed, capture: Played, frames: Played) -> float:
     """Median call of a window."""
     times_us: list[float] = []
     spent_us = 0.0
@@ -155,16 +153,16 @@ def _window_us(pipeline: Pipeline, capture: Capture, frames: Capture) -> float:
     return float(np.median(times_us))
 
 
-def stream_pass(pipeline: Pipeline, capture: Capture, frames: Capture) -> Pass:
+def stream_pass(pipeline: Timed, capture: Played, frames: Played) -> Pass:
     """Time one stream, one frame a call.
 
     Parameters
     ----------
-    pipeline : Pipeline
+    pipeline : Timed
         Warmed up before.
-    capture : Capture
+    capture : Played
         That the stream is opened for.
-    frames : Capture
+    frames : Played
         Received frames of it.
     """
     stream = pipeline.open(capture)
@@ -180,15 +178,15 @@ def _total(counters: list[Any]) -> int:
     return sum(stage.clusterings for stage in counters)
 
 
-def batch_times_us(pipeline: Pipeline, capture: Capture, frames: Capture, repeats: int = 5) -> FloatArray:
+def batch_times_us(pipeline: Timed, capture: Played, frames: Played, repeats: int = 5) -> FloatArray:
     """Time a frame of repeated batch runs (repeats,); one more before them only warms up.
 
     Parameters
     ----------
-    pipeline : Pipeline
-    capture : Capture
+    pipeline : Timed
+    capture : Played
         That streams are opened for.
-    frames : Capture
+    frames : Played
         Received frames of it; stepped through in blocks of ``BATCH_FRAMES``.
     repeats : int
 

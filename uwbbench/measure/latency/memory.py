@@ -10,8 +10,7 @@ from collections.abc import Callable
 from pathlib import Path
 from time import perf_counter
 
-from uwbbench.api.capture import Capture
-from uwbbench.detect.pipeline import Pipeline
+from uwbbench.measure.latency.played import Played, Timed
 from uwbbench.measure.latency.received import laps
 
 SETTLING_FRAMES = 300
@@ -40,7 +39,7 @@ def resident_bytes() -> int | None:
     return int(statm.read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
 
 
-def growth(pipeline: Pipeline, capture: Capture, frames: Capture) -> dict[str, float | int | None]:
+def growth(pipeline: Timed, capture: Played, frames: Played) -> dict[str, float | int | None]:
     """What one long stream keeps of every thousand frames once it has settled.
 
     Two streams are run, as watching allocations takes memory itself: one for the resident size, one for the objects.
@@ -48,11 +47,11 @@ def growth(pipeline: Pipeline, capture: Capture, frames: Capture) -> dict[str, f
 
     Parameters
     ----------
-    pipeline : Pipeline
+    pipeline : Timed
         Warmed up before.
-    capture : Capture
+    capture : Played
         That streams are opened for.
-    frames : Capture
+    frames : Played
         Received frames of it; gone through again and again.
 
     Returns
@@ -72,25 +71,28 @@ def growth(pipeline: Pipeline, capture: Capture, frames: Capture) -> dict[str, f
 
 
 def _grown(
-    pipeline: Pipeline, capture: Capture, frames: Capture, reading: Callable[[], int | None]
+    pipeline: Timed, capture: Played, frames: Played, reading: Callable[[], int | None]
 ) -> tuple[float | None, int]:
     """Growth of a reading for 1 000 frames of one stream, and the frames that it was seen over."""
     stream = pipeline.open(capture)
     source, numbers = laps(frames, SETTLING_FRAMES + MEASURED_FRAMES, renumbered="truth" not in stream.needs)
     step, receive, sts = stream.step, source.frames, "sts" in stream.needs
+    settling = min(SETTLING_FRAMES, len(numbers) // 3)
     coming = iter(numbers)
 
     def run(most: int, limit_s: float) -> int:
         until = perf_counter() + limit_s
         done = 0
-        while done < most and (perf_counter() < until or not done):  # one at least, whoever has the core meanwhile
+        while done < min(most, len(numbers) - settling) and (
+            perf_counter() < until or not done
+        ):  # one at least, whoever has the core meanwhile
             frame = next(coming)
             step(receive(frame, frame + 1, sts=sts)).records()
             done += 1
         gc.collect()
         return done
 
-    run(SETTLING_FRAMES, LIMIT_S / 3)
+    run(settling, LIMIT_S / 3)
     before = reading()
     count = run(MEASURED_FRAMES, LIMIT_S)
     after = reading()

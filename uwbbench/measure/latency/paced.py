@@ -19,10 +19,9 @@ from typing import Any
 import numpy as np
 
 from uwbbench.api.arrays import FloatArray
-from uwbbench.api.capture import Capture
-from uwbbench.detect.pipeline import Pipeline
 from uwbbench.measure.latency.latency import call_summary, miss_summary
 from uwbbench.measure.latency.loops import quiet
+from uwbbench.measure.latency.played import Played, Timed
 from uwbbench.measure.latency.received import laps
 
 SPIN_S = 0.3e-3
@@ -33,24 +32,24 @@ LATE_START_US = 10.0
 
 
 def paced_pass(
-    pipeline: Pipeline, capture: Capture, frames: Capture, rate_hz: float, seconds: float
+    pipeline: Timed, capture: Played, frames: Played, rate_hz: float, seconds: float
 ) -> tuple[FloatArray, FloatArray]:
     """Hand out frames at a rate, for a while, to one stream.
 
     Parameters
     ----------
-    pipeline : Pipeline
+    pipeline : Timed
         Warmed up before.
-    capture : Capture
+    capture : Played
         That the stream is opened for.
-    frames : Capture
+    frames : Played
         Received frames of it; they start again where they are shorter than that.
     rate_hz, seconds : float
 
     Returns
     -------
     times_us : (frames,) array
-        Time of every call.
+        Time of every call; a run is handed out once, so that there are no more than it has.
     lateness_us : (frames,) array
         From the moment at which the call could have started (the frame was due and the detector free) to its start.
     """
@@ -59,7 +58,7 @@ def paced_pass(
     source, numbers = laps(frames, count, renumbered="truth" not in stream.needs)
     step, receive, sts = stream.step, source.frames, "sts" in stream.needs
     period_ns, spin_ns = 1e9 / rate_hz, min(SPIN_S, 0.25 / rate_hz) * 1e9
-    times_ns, lateness_ns = np.empty(count), np.empty(count)
+    times_ns, lateness_ns = np.empty(len(numbers)), np.empty(len(numbers))
     with quiet():
         begin = perf_counter_ns() + int(period_ns)
         ended = begin

@@ -13,9 +13,19 @@ from typing import Any
 import numpy as np
 
 from uwbbench.api.capture import PER_FRAME, Capture
+from uwbbench.api.drive import Drive
 from uwbbench.api.truth import Trajectory
+from uwbbench.measure.latency.played import Played
 
 _SAMPLES = ("preamble", "sts1", "sts2")
+
+
+def received_run(drive: Drive, steps: int | None = None) -> Drive:
+    """First steps of a run, as :func:`received` gives the frames of a capture."""
+    stop = len(drive) if steps is None else min(steps, len(drive))
+    counts = {name: int(np.searchsorted(numbers, stop)) for name, numbers in drive.steps.items()}
+    parts = [received(capture, counts[capture.radar.receiver]) for capture in drive.captures]
+    return Drive(drive.name, tuple(parts))
 
 
 def received(capture: Capture, frames: int | None = None) -> Capture:
@@ -47,15 +57,17 @@ def _has(capture: Capture, name: str) -> bool:
     return getattr(capture, name) is not None
 
 
-def laps(capture: Capture, frames: int, *, renumbered: bool = True) -> tuple[Capture, list[int]]:
+def laps(capture: Played, frames: int, *, renumbered: bool = True) -> tuple[Played, list[int]]:
     """Received frames handed over again and again, with numbers and times that go on.
+
+    A run is handed over once: a robot that is back at its start of a sudden is another problem.
 
     A stream then sees one long recording, in which the robot is back at its start now and then. A detector that looks
     up the truth must get the old numbers again, which alone have one: not ``renumbered``.
 
     Parameters
     ----------
-    capture : Capture
+    capture : Capture or Drive
         Received, of one frame or more.
     frames : int
         So many in all.
@@ -64,11 +76,13 @@ def laps(capture: Capture, frames: int, *, renumbered: bool = True) -> tuple[Cap
 
     Returns
     -------
-    source : Capture
+    source : Capture or Drive
         To take frames from, one by one.
     numbers : list of int
         Those that it has, in order.
     """
+    if not isinstance(capture, Capture):
+        return capture, list(range(min(frames, len(capture))))
     if renumbered:
         return _again(capture, frames), list(range(frames))
     return capture, [number % len(capture) for number in range(frames)]

@@ -19,8 +19,11 @@ import yaml
 if TYPE_CHECKING:
     from uwbbench.api.arrays import FloatArray
     from uwbbench.api.capture import Capture
+    from uwbbench.api.drive import Drive
+    from uwbbench.detect.mapping import MappingPipeline
     from uwbbench.detect.pipeline import Pipeline
     from uwbbench.measure.latency.loops import Pass
+    from uwbbench.measure.latency.played import Played, Timed
 
 
 def main() -> int:
@@ -52,22 +55,20 @@ def _pin() -> int | None:
 
 def _measured(spec: dict[str, Any], core: int | None) -> dict[str, Any]:
     from uwbbench.api import registry
+    from uwbbench.api.capture import Capture
     from uwbbench.api.errors import CaptureError
-    from uwbbench.config.source import CaptureRef
     from uwbbench.measure.latency import loops, memory
     from uwbbench.measure.latency.compilations import undisturbed
     from uwbbench.measure.latency.machine import load
-    from uwbbench.measure.latency.received import received
 
     load_before = load()
     pipeline = _pipeline(spec["detector"])
     opening = perf_counter()
-    capture = CaptureRef(**{**spec["capture"], "roots": tuple(spec["capture"]["roots"])}).open()
-    frames = received(capture, spec["frames"])
+    capture, frames = _opened(spec)
     opening_s = perf_counter() - opening
     if len(frames) == 0:
         raise CaptureError(f"capture '{capture.name}' has no frames; there is nothing to time")
-    pipeline.open(capture).step(frames.frames(0, 1)).records()
+    _first_answer(pipeline, capture, frames)
     startup_s = perf_counter() - spec["started"] - opening_s
 
     warmed = loops.warm_up(pipeline, capture, frames, spec["warmup_windows"])
@@ -87,8 +88,9 @@ def _measured(spec: dict[str, Any], core: int | None) -> dict[str, Any]:
         notes.append("code was compiled during the timed passes: some times hold that of the compiler")
     instructions, instructions_note = _instructions(pipeline, capture, frames)
     null = _pipeline({"schema": 1, "name": "idle", "pipeline": [{"use": registry.default("stage.idle")}]})
-    loops.warm_up(null, capture, frames, spec["warmup_windows"])
-    overhead_us = loops.stream_pass(null, capture, frames).times_us
+    single = frames if isinstance(frames, Capture) else frames.captures[0]
+    loops.warm_up(null, single, single, spec["warmup_windows"])
+    overhead_us = loops.stream_pass(null, single, single).times_us
     growth = memory.growth(pipeline, capture, frames)
     os_threads, threads = _os_threads(), _threads()
     age = _age(pipeline, capture, frames, np.array(calls["times_us"]))
@@ -122,7 +124,26 @@ def _measured(spec: dict[str, Any], core: int | None) -> dict[str, Any]:
     }
 
 
-def _calls(pipeline: Pipeline, capture: Capture, frames: Capture) -> tuple[dict[str, Any], int]:
+def _opened(spec: dict[str, Any]) -> tuple[Capture | Drive, Capture | Drive]:
+    """What to measure on, a capture or a run, and its received frames."""
+    from uwbbench.config.source import CaptureRef, RunRef
+    from uwbbench.measure.latency.received import received, received_run
+
+    given: dict[str, Any] = {
+        name: tuple(value) if isinstance(value, list) else value for name, value in spec["capture"].items()
+    }
+    if "captures" in given:
+        drive = RunRef(**given).open()
+        return drive, received_run(drive, spec["frames"])
+    capture = CaptureRef(**given).open()
+    return capture, received(capture, spec["frames"])
+
+
+def _first_answer(pipeline: Timed, capture: Played, frames: Played) -> None:
+    pipeline.open(capture).step(frames.frames(0, 1)).records()
+
+
+def _calls(pipeline: Timed, capture: Capture | Drive, frames: Played) -> tuple[dict[str, Any], int]:
     """The stream, one frame a call, and how often something was compiled in it."""
     from uwbbench.measure.latency import latency, loops
     from uwbbench.measure.latency.compilations import undisturbed
@@ -149,15 +170,27 @@ def _calls(pipeline: Pipeline, capture: Capture, frames: Capture) -> tuple[dict[
     return figures, compilations
 
 
-def _age(pipeline: Pipeline, capture: Capture, frames: Capture, times_us: FloatArray) -> dict[str, Any] | None:
+def _age(
+    pipeline: Timed, capture: Capture | Drive, frames: Capture | Drive, times_us: FloatArray
+) -> dict[str, Any] | None:
     """How late detections are handed out; a pass of its own, whose streams see the frames that were timed."""
+    from uwbbench.api.capture import Capture
+    from uwbbench.api.drive import Drive
     from uwbbench.detect.hand_out import driven
+    from uwbbench.detect.mapping import MappingPipeline
+    from uwbbench.detect.pipeline import Pipeline
     from uwbbench.measure.accuracy.age import age_summary
 
+    if isinstance(pipeline, MappingPipeline):
+        assert isinstance(capture, Drive)  # noqa: S101 - opened so
+        return age_summary(pipeline.answers(capture, len(times_us)), capture.time_s[: len(times_us)], times_us)
+    assert isinstance(pipeline, Pipeline) and isinstance(capture, Capture) and isinstance(frames, Capture)  # noqa: S101, PT018
     return age_summary(driven(pipeline.open(capture), frames), frames.trajectory.timestamp_s, times_us)
 
 
-def _paced(pipeline: Pipeline, capture: Capture, frames: Capture, spec: dict[str, Any]) -> tuple[dict[str, Any], int]:
+def _paced(
+    pipeline: Timed, capture: Capture | Drive, frames: Played, spec: dict[str, Any]
+) -> tuple[dict[str, Any], int]:
     """Frames at a fixed rate, where that was asked for, and how often something was compiled meanwhile."""
     from uwbbench.measure.latency import paced
     from uwbbench.measure.latency.compilations import undisturbed
@@ -173,16 +206,19 @@ def _paced(pipeline: Pipeline, capture: Capture, frames: Capture, spec: dict[str
 
 
 def _ratio(
-    pipeline: Pipeline, capture: Capture, frames: Capture, spec: dict[str, Any]
+    pipeline: Pipeline | MappingPipeline, capture: Capture | Drive, frames: Capture | Drive, spec: dict[str, Any]
 ) -> tuple[dict[str, Any] | None, int]:
     """Alternating with the reference, where there is one, and how often something was compiled meanwhile."""
+    from uwbbench.api.capture import Capture
+    from uwbbench.detect.pipeline import Pipeline
     from uwbbench.measure.latency.compilations import undisturbed
     from uwbbench.measure.latency.player import Player, in_turns, turn_frames
     from uwbbench.measure.latency.ratio import ratio_summary
 
-    if spec["reference"] is None:
+    reference = None if spec["reference"] is None else _pipeline(spec["reference"])
+    if not (isinstance(pipeline, Pipeline) and isinstance(reference, Pipeline)):  # a reference is of single captures
         return None, 0
-    reference = _pipeline(spec["reference"])
+    assert isinstance(capture, Capture) and isinstance(frames, Capture)  # noqa: S101, PT018 - opened so
     players = [Player(timed, capture, frames) for timed in (pipeline, reference)]
     players[1].warm_up(spec["warmup_windows"])
     size = turn_frames([player.call_s() for player in players], len(frames))
@@ -194,7 +230,7 @@ def _ratio(
     return {"reference": reference.name, **ratio, "disturbed_blocks": disturbed}, compilations
 
 
-def _instructions(pipeline: Pipeline, capture: Capture, frames: Capture) -> tuple[float | None, str]:
+def _instructions(pipeline: Timed, capture: Played, frames: Played) -> tuple[float | None, str]:
     """Instructions a frame, in a pass of its own."""
     from uwbbench.measure.latency import loops
     from uwbbench.measure.latency.counters import counted
@@ -211,12 +247,14 @@ def _instructions(pipeline: Pipeline, capture: Capture, frames: Capture) -> tupl
     return None if count is None else count / len(frames), note
 
 
-def _pipeline(data: dict[str, Any]) -> Pipeline:
+def _pipeline(data: dict[str, Any]) -> Pipeline | MappingPipeline:
     from uwbbench.api.yaml_file import YamlFile
     from uwbbench.config.detector import check_detector
+    from uwbbench.detect.mapping import MappingPipeline
     from uwbbench.detect.pipeline import Pipeline
 
-    return Pipeline(check_detector(data, YamlFile(f"detector '{data['name']}'", data, {})))
+    config = check_detector(data, YamlFile(f"detector '{data['name']}'", data, {}))
+    return Pipeline(config) if config.mapper is None else MappingPipeline(config)
 
 
 def _surroundings(core: int | None) -> dict[str, Any]:

@@ -22,7 +22,7 @@ import numpy as np
 
 from uwbbench.api.errors import UwbbenchError
 from uwbbench.api.text import one_line, printable
-from uwbbench.config.detector import RESULTS, detector_identity, from_results
+from uwbbench.config.identity import RESULTS, detector_identity, from_results
 from uwbbench.measure.accuracy.metrics.choice import MetricChoice, names_of
 from uwbbench.measure.accuracy.rules import rules_on
 from uwbbench.measure.accuracy.scoring import column_of

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from uwbbench.api import Capture, Params, Term, rotate_z, wrap_angle
 
@@ -16,6 +16,28 @@ class OdometryParams(Params):
     distance_error: float = Field(0.02, ge=0, lt=1, description="Standard deviation of the scale, drawn once a run.")
     rotation_error: float = Field(0.02, ge=0, lt=1, description="The same for the angle turned.")
     heading_noise_deg: float = Field(0.5, ge=0, description="Random walk of the heading, after one metre.")
+    drift: float | None = Field(
+        None,
+        ge=0,
+        lt=1,
+        description="All three in one number, for scenes that vary it: that error of distance and rotation, and 50 "
+        "degrees times it of heading noise.",
+    )
+
+    @model_validator(mode="after")
+    def _said_once(self) -> OdometryParams:
+        if self.drift is not None:
+            other = next(iter(sorted(self.model_fields_set - {"drift"})), None)
+            if other is not None:
+                raise ValueError(f"drift stands for {other} too; give one of the two")
+        return self
+
+    @property
+    def errors(self) -> tuple[float, float, float]:
+        """Errors of distance and rotation, and the heading noise in radians."""
+        if self.drift is not None:
+            return self.drift, self.drift, np.radians(50 * self.drift)
+        return self.distance_error, self.rotation_error, np.radians(self.heading_noise_deg)
 
 
 class Odometry(Term[OdometryParams]):
@@ -29,11 +51,11 @@ class Odometry(Term[OdometryParams]):
 
     def record(self, capture: Capture, rng: np.random.Generator) -> Capture:
         """Add the drifting pose."""
-        p, track = self.params, capture.trajectory
-        stretch = 1 + p.distance_error * rng.standard_normal()
-        turned = 1 + p.rotation_error * rng.standard_normal()
+        track, (distance, rotation, heading) = capture.trajectory, self.params.errors
+        stretch = 1 + distance * rng.standard_normal()
+        turned = 1 + rotation * rng.standard_normal()
         steps = np.diff(track.position_m, axis=0)
-        walk = np.radians(p.heading_noise_deg) * np.sqrt(np.linalg.norm(steps, axis=1))
+        walk = heading * np.sqrt(np.linalg.norm(steps, axis=1))
         turns = turned * wrap_angle(np.diff(track.yaw_rad)) + walk * rng.standard_normal(len(steps))
         yaw_rad = track.yaw_rad[:1] + np.concatenate([[0.0], np.cumsum(turns)])[: len(track)]
         own = stretch * rotate_z(steps, yaw_rad[:-1] - track.yaw_rad[:-1])

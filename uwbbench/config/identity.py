@@ -1,0 +1,51 @@
+"""What a detector is, as one hash: its resolved file, and the sources of what it is made of."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from typing import Any
+
+RESULTS_FILE = "results file"
+"""Fidelity of a detector that is known by what it has written alone, and how tables mark its rows."""
+
+MAPPER = "mapper "
+"""What the names of mappers begin with among the names of sources."""
+
+KERNEL = "kernel "
+"""What the names of kernels begin with among the names of sources."""
+
+RESULTS = "results of "
+"""What the names of such detectors begin with among the names of sources."""
+
+
+def from_results(config: Mapping[str, Any]) -> bool:
+    """Whether a resolved detector is known by what it has written alone."""
+    return bool(config.get("fidelity") == RESULTS_FILE)
+
+
+def detector_identity(config: Mapping[str, Any], sources: Mapping[str, str]) -> str:
+    """SHA-256 over a resolved detector and the sources of its stages.
+
+    Parameters
+    ----------
+    config : mapping
+        As :meth:`DetectorConfig.to_dict` gives it.
+    sources : mapping of str to str
+        SHA-256 of the sources of each stage by its name, and of each kernel, which may stand for some, by its name
+        behind ``KERNEL``. Those of other stages do not count. For a detector that is known by what it has written
+        alone: SHA-256 of that by its name behind ``RESULTS``, and nothing else. That of a mapper by its name behind
+        ``MAPPER``.
+    """
+    if from_results(config):
+        name = f"{RESULTS}{config['name']}"
+        used = {name: sources[name]}
+    else:
+        used = {step["use"]: sources[step["use"]] for step in config["pipeline"]}
+        used |= {name: sha256 for name, sha256 in sources.items() if name.startswith(KERNEL)}
+        if "mapper" in config:
+            name = f"{MAPPER}{config['mapper']['use']}"
+            used[name] = sources[name]
+    text = json.dumps({"detector": config, "sources": used}, sort_keys=True)
+    return hashlib.sha256(text.encode()).hexdigest()
