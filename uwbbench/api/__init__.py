@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from uwbbench.api.compiling import compiled, inlined
     from uwbbench.api.dataset import Card, Dataset, DatasetFile, DatasetFolder
     from uwbbench.api.detections import COLUMNS, Detections
-    from uwbbench.api.drive import Drive, odometry_of, relative
+    from uwbbench.api.drive import Drive, compose, odometry_of, relative
     from uwbbench.api.errors import (
         CaptureError,
         ConfigError,
@@ -48,7 +48,7 @@ if TYPE_CHECKING:
     from uwbbench.api.kernel import Kernel
     from uwbbench.api.learning import Assessed, Example, LearnedParams, Trainable, Weights, expect_arrays
     from uwbbench.api.locate import find_config
-    from uwbbench.api.mapper import LANDMARK_KINDS, Grid, Landmarks, Map, Mapped, Mapper, Poses, Step
+    from uwbbench.api.mapper import LANDMARK_KINDS, Grid, LandmarkKind, Landmarks, Map, Mapped, Mapper, Poses, Step
     from uwbbench.api.metric import Metric, Outcome
     from uwbbench.api.numba_internals import as_tuple
     from uwbbench.api.outcomes import PresenceOutcome, SegmentOutcome, TrackOutcome
@@ -75,7 +75,7 @@ _HOME = {
     "compiling": ("compiled", "inlined"),
     "dataset": ("Card", "Dataset", "DatasetFile", "DatasetFolder"),
     "detections": ("COLUMNS", "Detections"),
-    "drive": ("Drive", "odometry_of", "relative"),
+    "drive": ("Drive", "compose", "odometry_of", "relative"),
     "errors": ("CaptureError", "ConfigError", "PluginError", "ScoringError", "StoreError", "UwbbenchError", "nearest"),
     "filters": ("Limit", "LimitFilter", "RankFilter", "RankParams"),
     "frames": ("Frames", "magnitude"),
@@ -94,7 +94,7 @@ _HOME = {
     "kernel": ("Kernel",),
     "learning": ("Assessed", "Example", "LearnedParams", "Trainable", "Weights", "expect_arrays"),
     "locate": ("find_config",),
-    "mapper": ("LANDMARK_KINDS", "Grid", "Landmarks", "Map", "Mapped", "Mapper", "Poses", "Step"),
+    "mapper": ("LANDMARK_KINDS", "Grid", "LandmarkKind", "Landmarks", "Map", "Mapped", "Mapper", "Poses", "Step"),
     "metric": ("Metric", "Outcome"),
     "numba_internals": ("as_tuple",),
     "outcomes": ("PresenceOutcome", "SegmentOutcome", "TrackOutcome"),
@@ -143,6 +143,7 @@ __all__ = [
     "Grid",
     "IntArray",
     "Kernel",
+    "LandmarkKind",
     "Landmarks",
     "LearnedParams",
     "Limit",
@@ -193,6 +194,7 @@ __all__ = [
     "cases_of",
     "checked",
     "compiled",
+    "compose",
     "direction",
     "exact_ulps",
     "expect_arrays",

@@ -1,1 +1,1 @@
-"""Back ends that make poses and maps of what front ends detect."""
+"""Mappers: poses and maps from what the receivers of a robot find."""

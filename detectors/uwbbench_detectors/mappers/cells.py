@@ -45,8 +45,8 @@ class Cells:
             Corners of the box, x and y.
         """
         ends = np.clip(np.floor(np.stack([low_m, high_m + self.cell_m]) / self.cell_m), -self._most, self._most)
-        x, y = (np.arange(*ends[:, axis].astype(np.int64)) for axis in (0, 1))
-        return (x + 0.5) * self.cell_m, (y + 0.5) * self.cell_m
+        columns, rows = (np.arange(low, high) for low, high in ends.T)
+        return (columns + 0.5) * self.cell_m, (rows + 0.5) * self.cell_m
 
     def add(self, x_m: FloatArray, y_m: FloatArray, evidence: FloatArray) -> None:
         """Add log-odds to a box of cells, and keep the sums within their bounds.

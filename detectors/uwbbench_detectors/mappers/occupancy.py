@@ -67,9 +67,7 @@ class OccupancyParams(Params):
         (-2.0, 3.5),
         description="Least and largest log-odds of a cell, so that a place that changes is not held to be what it was.",
     )
-    reach_m: tuple[float, float] = Field(
-        (0.5, 3.5), description="Detections nearer or farther than this are left out."
-    )
+    reach_m: tuple[float, float] = Field((0.5, 3.5), description="Detections nearer or farther than this are left out.")
     azimuth_deg: float = Field(50.0, gt=0, le=180, description="So are those further from the boresight than this.")
     extent_m: float = Field(
         100.0, gt=0, description="Cells further than this from the origin, in x or in y, are not kept."
@@ -129,8 +127,9 @@ class Occupancy(Mapper[OccupancyParams]):
         self._radars = dict(radars)
         self._cells = Cells(p.cell_m, p.clamp, p.extent_m)
         self._pose = start.pose[0]
-        self._locate = None if p.poses is None else p.poses.made()
-        if self._locate is not None:
+        self._locate: Mapper[Any] | None = None
+        if p.poses is not None:
+            self._locate = p.poses.made()
             self._locate.open(radars, start)
             if len(radars) < self._locate.receivers:
                 self.note(f"poses: '{p.poses.use}' works with {self._locate.receivers} receivers, not {len(radars)}")
@@ -178,15 +177,13 @@ class Occupancy(Mapper[OccupancyParams]):
         end_m = (range_m + SIGMAS * range_sd_m)[:, None]
         sides = heading[:, None] + SIGMAS * azimuth_sd_rad * np.array([-1.0, 0.0, 1.0])
         bulge_m = end_m.max() * (1.0 - np.cos(SIGMAS * azimuth_sd_rad / 2))
-        along_x, along_y = (np.append(end_m * turned, 0.0) for turned in (np.cos(sides), np.sin(sides)))
-        low_m = eye_m + (along_x.min() - bulge_m, along_y.min() - bulge_m)
-        high_m = eye_m + (along_x.max() + bulge_m, along_y.max() + bulge_m)
+        ends_m = np.stack([(end_m * turned).ravel() for turned in (np.cos(sides), np.sin(sides))])
+        low_m = eye_m + np.minimum(ends_m.min(axis=1), 0.0) - bulge_m
+        high_m = eye_m + np.maximum(ends_m.max(axis=1), 0.0) + bulge_m
         x_m, y_m = self._cells.around(low_m, high_m)
         if not self._cells.holds(low_m, high_m):
             self.note(f"map.occupancy: what lies more than {p.extent_m:g} m from the origin is not in the map")
-        evidence = says(
-            x_m[None, :] - eye_m[0], y_m[:, None] - eye_m[1], range_m, heading, range_sd_m, azimuth_sd_rad
-        )
+        evidence = says(x_m[None, :] - eye_m[0], y_m[:, None] - eye_m[1], range_m, heading, range_sd_m, azimuth_sd_rad)
         self._cells.add(x_m, y_m, np.where(evidence > 0, p.occupied, p.free) * evidence)
 
 

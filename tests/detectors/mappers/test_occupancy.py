@@ -198,7 +198,7 @@ def test_wrong_parameters_are_refused_with_what_was_expected(make_mapper, params
 
 
 def test_an_unknown_mapper_of_poses_is_refused_with_the_nearest_name(make_mapper):
-    with pytest.raises(PluginError, match="Did you mean 'map.occupancy'"):
+    with pytest.raises(PluginError, match=r"Did you mean 'map\.occupancy'"):
         make_mapper(poses={"use": "map.ocupancy"})
 
 

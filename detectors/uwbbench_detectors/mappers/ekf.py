@@ -1,0 +1,338 @@
+"""An extended Kalman filter over a robot's pose, the scales of its odometry, and landmarks of several kinds.
+
+The state is x, y, yaw, two scale errors, and two numbers for each landmark. What a landmark looks like from a pose says
+a :class:`Model`, one for each kind.
+
+A step costs what is near. Landmarks farther away than ``near_m`` rest: what a prediction or an update means to them is
+gathered in three small matrices and carried out when the robot leaves its neighbourhood. The result is that of the
+filter over everything, not an approximation (Guivant and Nebot, Optimization of the simultaneous localization and
+map-building algorithm for real-time implementation, IEEE T-RA 17(3), 2001).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from uwbbench.api import LANDMARK_KINDS, FloatArray, IntArray, LandmarkKind, Landmarks
+from uwbbench_detectors.mappers.motion import HEAD, Motion, MotionParams, wrapped
+from uwbbench_detectors.mappers.rest import Rest, places_of
+
+
+class Model(Protocol):
+    """How landmarks of one kind are seen; ``k`` numbers are measured of each."""
+
+    kind: LandmarkKind
+
+    def expected(self, pose: FloatArray, marks: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """What would be measured of landmarks (m, 2) from a pose (3,).
+
+        Returns
+        -------
+        (m, k) array, (m, k, 3) array, (m, k, 2) array
+            And its derivatives by the pose and by the landmark.
+        """
+
+    def differences(self, measured: FloatArray, expected: FloatArray) -> FloatArray:
+        """Measured (k,) minus expected (m, k), angles wrapped."""
+
+    def placed(self, pose: FloatArray, measured: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Where a landmark stands of which this (k,) is measured from a pose (3,).
+
+        Returns
+        -------
+        (2,) array, (2, 3) array, (2, k) array
+            And its derivatives by the pose and by what is measured.
+        """
+
+
+@dataclass
+class _Mark:
+    """What is known of a landmark besides its place."""
+
+    number: int
+    kind: LandmarkKind
+    support: int
+
+
+class Ekf:
+    """The filter.
+
+    Landmarks are addressed by handles, which never return. All angles of the state are wrapped.
+
+    Parameters
+    ----------
+    pose : (3,) array
+        Where the run starts; certain, as everything is measured from there.
+    motion : MotionParams
+    near_m : float
+        Landmarks within this distance of the robot take part in each update at once. Lines always do.
+    reach_m : float
+        How far the robot sees: the neighbourhood is left when the robot has moved by ``near_m - reach_m``.
+    """
+
+    def __init__(self, pose: FloatArray, motion: MotionParams, near_m: float = 8.0, reach_m: float = 5.0) -> None:
+        self.motion = Motion(motion)
+        self._mean = np.concatenate([np.asarray(pose, np.float64), [0.0, 0.0]])
+        self._covariance = np.diag(self.motion.start_variance)
+        self._near: list[int] = []  # handles of the landmarks behind the head, in order
+        self._starts: dict[int, int] = {}  # where each of them begins
+        self._marks: dict[int, _Mark] = {}
+        self._next = 0
+        self._near_m, self._leave_m = near_m, near_m - reach_m
+        self._center_m = self._mean[:2].copy()
+        self._rest = Rest()
+
+    def __len__(self) -> int:
+        return len(self._marks)
+
+    @property
+    def pose(self) -> FloatArray:
+        """Pose (3,) as it is known now."""
+        return self._mean[:3].copy()
+
+    @property
+    def pose_covariance(self) -> FloatArray:
+        """Covariance (3, 3) of the pose."""
+        return self._covariance[:3, :3].copy()
+
+    @property
+    def scales(self) -> FloatArray:
+        """By which share odometry is short of distances and of turns (2,)."""
+        return self._mean[3:HEAD].copy()
+
+    def place(self, handle: int) -> FloatArray:
+        """The two numbers (2,) of a landmark that is near."""
+        start = self._at(handle)
+        return self._mean[start : start + 2].copy()
+
+    def support(self, handle: int) -> int:
+        """Observations that a landmark is made of."""
+        return self._marks[handle].support
+
+    def near(self, kind: str) -> list[int]:
+        """Handles of the landmarks of one kind that are near."""
+        return [handle for handle in self._near if self._marks[handle].kind == kind]
+
+    def predict(self, moved: FloatArray) -> None:
+        """Move by a step (3,) of odometry, in the robot's frame before it."""
+        self._mean[:3], by_head, noise = self.motion.predicted(self._mean[:HEAD], moved)
+        self._covariance[:3] = by_head @ self._covariance[:HEAD]
+        self._covariance[:, :3] = self._covariance[:, :HEAD] @ by_head.T
+        self._covariance[:3, :3] += noise
+        self._rest.predict(by_head)
+        if np.hypot(*(self._mean[:2] - self._center_m)) > self._leave_m:
+            self._move_on()
+
+    def doubt(self, covariance: FloatArray) -> None:
+        """Add to the covariance (3, 3) of the pose, after something that the motion model does not know."""
+        self._covariance[:3, :3] += covariance
+
+    def distances(
+        self, model: Model, measured: FloatArray, noise: FloatArray, handles: list[int] | None = None
+    ) -> tuple[list[int], FloatArray]:
+        """How well near landmarks of the model's kind explain a measurement.
+
+        Parameters
+        ----------
+        model : Model
+        measured : (k,) array
+        noise : (k, k) array
+            Its covariance.
+        handles : list of int, optional
+            Of near landmarks; all of the kind by default.
+
+        Returns
+        -------
+        list of int, (m,) array
+            Handles, and squared Mahalanobis distances of the measurement from what is expected of each.
+        """
+        handles = self.near(model.kind) if handles is None else handles
+        if not handles:
+            return [], np.zeros(0)
+        starts = np.array([self._at(handle) for handle in handles])
+        marks = self._mean[starts[:, None] + np.arange(2)]
+        expected, by_pose, by_mark = model.expected(self._mean[:3], marks)
+        off = model.differences(measured, expected)
+        by_both = np.concatenate([by_pose, by_mark], axis=2)
+        rows = np.concatenate([np.broadcast_to(np.arange(3), (len(starts), 3)), starts[:, None] + np.arange(2)], axis=1)
+        known = self._covariance[rows[:, :, None], rows[:, None, :]]
+        spread = by_both @ known @ by_both.swapaxes(1, 2) + noise
+        weighed = np.linalg.solve(spread, off[:, :, None])[:, :, 0]
+        return handles, np.asarray((weighed * off).sum(axis=1))
+
+    def update(self, model: Model, handle: int, measured: FloatArray, noise: FloatArray) -> float:
+        """Take in a measurement of a landmark that is known to be this one.
+
+        Parameters
+        ----------
+        model : Model
+        handle : int
+        measured : (k,) array
+        noise : (k, k) array
+
+        Returns
+        -------
+        float
+            Squared Mahalanobis distance of the measurement from what was expected: chi-square with k degrees of
+            freedom in a filter that is right about itself.
+        """
+        start = self._at(handle)
+        expected, by_pose, by_mark = model.expected(self._mean[:3], self._mean[None, start : start + 2])
+        off = model.differences(measured, expected)[0]
+        self._marks[handle].support += 1
+        return self._correct(
+            np.array([0, 1, 2, start, start + 1]), np.concatenate([by_pose[0], by_mark[0]], axis=1), off, noise
+        )
+
+    def add(self, model: Model, measured: FloatArray, noise: FloatArray, number: int | None = None) -> int:
+        """Begin a landmark where a measurement places it.
+
+        Parameters
+        ----------
+        model : Model
+        measured : (k,) array
+        noise : (k, k) array
+        number : int, optional
+            By which the map calls it; its handle by default.
+
+        Returns
+        -------
+        int
+            Its handle.
+        """
+        mark, by_pose, by_measured = model.placed(self._mean[:3], measured)
+        size = len(self._mean)
+        grown = np.empty((size + 2, size + 2))
+        grown[:size, :size] = self._covariance
+        grown[size:, :size] = by_pose @ self._covariance[:3]
+        grown[:size, size:] = grown[size:, :size].T
+        grown[size:, size:] = by_pose @ self._covariance[:3, :3] @ by_pose.T + by_measured @ noise @ by_measured.T
+        self._covariance = grown
+        self._mean = np.concatenate([self._mean, mark])
+        self._rest.add(by_pose)
+        handle = self._next
+        self._next += 1
+        self._near.append(handle)
+        self._starts[handle] = size
+        self._marks[handle] = _Mark(handle if number is None else number, model.kind, 1)
+        return handle
+
+    def remove(self, handle: int) -> None:
+        """Forget a landmark that is near, but not what it has said of the others."""
+        start = self._at(handle)
+        rows = [start, start + 1]
+        self._mean = np.delete(self._mean, rows)
+        self._covariance = np.delete(np.delete(self._covariance, rows, axis=0), rows, axis=1)
+        self._rest.remove(rows)
+        self._set_near([other for other in self._near if other != handle])
+        del self._marks[handle]
+
+    def apart(self, one: int, other: int) -> float:
+        """Squared Mahalanobis distance of two near landmarks of one kind from being at one place."""
+        rows, difference, by_both = self._difference(one, other)
+        known = self._covariance[np.ix_(rows, rows)]
+        return float(difference @ np.linalg.solve(by_both @ known @ by_both.T, difference))
+
+    def merge(self, kept: int, dropped: int, noise: FloatArray) -> None:
+        """Take two near landmarks of one kind for the same one.
+
+        Parameters
+        ----------
+        kept, dropped : int
+            Handles.
+        noise : (2, 2) array
+            Covariance of how far two places of one landmark may be apart.
+        """
+        rows, difference, by_both = self._difference(kept, dropped)
+        self._correct(rows, by_both, -difference, noise)
+        self._marks[kept].support += self._marks[dropped].support
+        self.remove(dropped)
+
+    def landmarks(self, least_support: int = 1) -> Landmarks:
+        """All landmarks with at least so much support, by their handles."""
+        self._settle()
+        kept = sorted(handle for handle, mark in self._marks.items() if mark.support >= least_support)
+        if not kept:
+            return Landmarks.none()
+        marks = [self._marks[handle] for handle in kept]
+        starts = np.array([self._rest.at(handle) for handle in kept])
+        places = self._rest.mean[starts[:, None] + np.arange(2)]
+        rows = starts[:, None] + np.arange(2)
+        return Landmarks(
+            identity=np.array([mark.number for mark in marks]),
+            kind=np.array([LANDMARK_KINDS.index(mark.kind) for mark in marks]),
+            a=places[:, 0],
+            b=places[:, 1],
+            covariance=self._rest.covariance[rows[:, :, None], rows[:, None, :]],
+            support=np.array([mark.support for mark in marks]),
+        )
+
+    def _at(self, handle: int) -> int:
+        """First of the two places of a near landmark in the near state."""
+        return self._starts[handle]
+
+    def _set_near(self, handles: list[int]) -> None:
+        self._near = handles
+        self._starts = {handle: HEAD + 2 * place for place, handle in enumerate(handles)}
+
+    def _difference(self, one: int, other: int) -> tuple[IntArray, FloatArray, FloatArray]:
+        """Places (4,) of two landmarks, their difference (2,), and its derivative (2, 4)."""
+        first, second = self._at(one), self._at(other)
+        rows = np.array([first, first + 1, second, second + 1])
+        difference = self._mean[first : first + 2] - self._mean[second : second + 2]
+        return rows, difference, np.hstack([np.eye(2), -np.eye(2)])
+
+    def _correct(self, rows: IntArray, seen: FloatArray, off: FloatArray, noise: FloatArray) -> float:
+        """Update with what depends on a few values of the near state alone.
+
+        The covariance is that of Joseph's form, ``(I - K H) P (I - K H)' + K R K'``, multiplied out so that the zeros
+        of H cost nothing: symmetric whatever is rounded.
+
+        Parameters
+        ----------
+        rows : (r,) int array
+            Places of these values.
+        seen : (k, r) array
+            Derivative H by them.
+        off : (k,) array
+            Innovation.
+        noise : (k, k) array
+            Covariance R.
+
+        Returns
+        -------
+        float
+            Squared Mahalanobis distance of the innovation.
+        """
+        across = self._covariance[:, rows] @ seen.T
+        spread = seen @ across[rows] + noise
+        weight = np.asarray(np.linalg.inv(spread), np.float64)
+        gain = across @ weight
+        self._mean += gain @ off
+        self._mean[2] = wrapped(self._mean[2])
+        half = gain @ across.T - gain @ (spread / 2) @ gain.T
+        self._covariance -= half + half.T
+        self._rest.correct(seen, weight, off, gain, rows)
+        return float(off @ weight @ off)
+
+    def _settle(self) -> None:
+        """Bring the landmarks that rest up to date."""
+        self._rest.settle(self._mean, self._covariance, self._near, set(self._marks))
+
+    def _move_on(self) -> None:
+        """Choose anew which landmarks are near."""
+        self._settle()
+        rest = self._rest
+        self._center_m = self._mean[:2].copy()
+        places = rest.mean[HEAD:].reshape(-1, 2)
+        near = np.hypot(*(places - self._center_m).T) <= self._near_m
+        lines = np.array([self._marks[handle].kind == "line" for handle in rest.handles], bool)
+        chosen = near | lines
+        self._set_near([handle for handle, taken in zip(rest.handles, chosen, strict=True) if taken])
+        resting = [handle for handle, taken in zip(rest.handles, chosen, strict=True) if not taken]
+        columns = places_of(rest.handles, self._near)
+        rest.enter(columns, resting)
+        self._mean, self._covariance = rest.mean[columns], rest.covariance[np.ix_(columns, columns)]
