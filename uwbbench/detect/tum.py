@@ -2,11 +2,11 @@
 
 Conventions
 -----------
-* A line a pose, ``time tx ty tz qx qy qz qw`` between white space: seconds, metres, and a unit quaternion that turns the
-  robot's axes into those of the map (Sturm et al., A Benchmark for the Evaluation of RGB-D SLAM Systems, IROS 2012).
-  Lines that start with ``#`` and empty lines are skipped.
-* Poses here are planar. Of a file the height is left out, and the heading is the quaternion's turn about z; a robot that
-  leans further than :data:`LEANING_RAD` is refused, as then the axes are others, such as those of a camera.
+* A line a pose, ``time tx ty tz qx qy qz qw`` between white space: seconds, metres, and a unit quaternion that turns
+  the robot's axes into those of the map (Sturm et al., A Benchmark for the Evaluation of RGB-D SLAM Systems, IROS
+  2012). Lines that start with ``#`` and empty lines are skipped.
+* Poses here are planar. Of a file the height is left out, and the heading is the quaternion's turn about z; a robot
+  that leans further than :data:`LEANING_RAD` is refused, as then the axes are others, such as those of a camera.
 * Numbers are written so that they are read back bit by bit, but for the heading, which goes by way of its quaternion.
 """
 
@@ -69,7 +69,9 @@ def read_tum(path: Path, content: bytes) -> tuple[FloatArray, FloatArray]:
     order = np.argsort(table[:, 0], kind="stable")
     again = np.flatnonzero(np.diff(table[order, 0]) == 0)
     if len(again):
-        raise ScoringError(f"{places[order[again[0] + 1]]}: time {table[order[again[0]], 0].item()!r} has another pose already")
+        raise ScoringError(
+            f"{places[order[again[0] + 1]]}: time {table[order[again[0]], 0].item()!r} has another pose already"
+        )
     return table[order, 0], np.column_stack([table[:, 1:3], _headings(table[:, 4:], places)])[order]
 
 
@@ -104,7 +106,7 @@ def _headings(quaternion: FloatArray, places: list[str]) -> FloatArray:
         row = int(np.argmax(leaning))
         degrees = math.degrees(math.acos(max(-1.0, upright[row])))
         raise ScoringError(
-            f"{places[row]}: the robot leans by {degrees:.0f} degrees. Is qw the last of the four, and are the axes the "
-            "robot's, x forward and z up, not those of a camera?"
+            f"{places[row]}: the robot leans by {degrees:.0f} degrees. Is qw the last of the four, and are the axes "
+            "those of a robot, x forward and z up, and not of a camera?"
         )
-    return np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
+    return np.asarray(np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z)))

@@ -18,6 +18,7 @@ from uwbbench.api import (
     Poses,
     Radar,
     Step,
+    compose,
     load_plugin,
     ports,
     wrap_angle,
@@ -136,11 +137,7 @@ class Occupancy(Mapper[OccupancyParams]):
 
     def step(self, step: Step) -> Poses:
         """Draw what was found from where the robot is."""
-        ahead, left, turn = step.moved
-        x, y, yaw = self._pose
-        cosine, sine = np.cos(yaw), np.sin(yaw)
-        turned = wrap_angle(np.asarray(yaw + turn))
-        self._pose = np.array([x + cosine * ahead - sine * left, y + sine * ahead + cosine * left, turned])
+        self._pose = compose(self._pose, step.moved)
         poses = Poses.of_one(step.index, self._pose)
         if self._locate is not None:
             poses = self._locate.step(step)
@@ -166,12 +163,8 @@ class Occupancy(Mapper[OccupancyParams]):
         if not usable.any():
             return
         range_m, azimuth_rad = range_m[usable], azimuth_rad[usable]
-        x, y, yaw = self._pose
-        mount_x, mount_y = radar.mount_position_m[:2]
-        eye_m = np.array(
-            [x + np.cos(yaw) * mount_x - np.sin(yaw) * mount_y, y + np.sin(yaw) * mount_x + np.cos(yaw) * mount_y]
-        )
-        heading = yaw + radar.mount_yaw_rad + azimuth_rad
+        *eye_m, boresight_rad = compose(self._pose, np.array([*radar.mount_position_m[:2], radar.mount_yaw_rad]))
+        heading = boresight_rad + azimuth_rad
         range_sd_m, azimuth_sd_rad = max(p.range_sd_m, p.cell_m / 2), np.radians(p.azimuth_sd_deg)
         # The box of eye and beams: the ends of their middles and sides, and the bulge of the arcs between these.
         end_m = (range_m + SIGMAS * range_sd_m)[:, None]
