@@ -57,7 +57,7 @@ if TYPE_CHECKING:
     from uwbbench.api.recording import leak_key, leaks, simulated_recording
     from uwbbench.api.registry import load_plugin
     from uwbbench.api.stage import Fidelity, Filter, P, Params, Stage, ports
-    from uwbbench.api.term import EchoFading, EchoTail, Paths, Pulse, Responses, SceneObject, Term, View
+    from uwbbench.api.term import EchoFading, EchoTail, Paths, Pulse, Responses, SceneAnchor, SceneObject, Term, View
     from uwbbench.api.trial import StagesOnTrial, exact_ulps
     from uwbbench.api.truth import Obstacle, Sight, Trajectory, Truth
     from uwbbench.api.yaml_file import YamlFile, read_yaml
@@ -103,7 +103,7 @@ _HOME = {
     "recording": ("leak_key", "leaks", "simulated_recording"),
     "registry": ("load_plugin",),
     "stage": ("Fidelity", "Filter", "P", "Params", "Stage", "ports"),
-    "term": ("EchoFading", "EchoTail", "Paths", "Pulse", "Responses", "SceneObject", "Term", "View"),
+    "term": ("EchoFading", "EchoTail", "Paths", "Pulse", "Responses", "SceneAnchor", "SceneObject", "Term", "View"),
     "trial": ("StagesOnTrial", "exact_ulps"),
     "truth": ("Obstacle", "Sight", "Trajectory", "Truth"),
     "yaml_file": ("YamlFile", "read_yaml"),
@@ -168,6 +168,7 @@ __all__ = [
     "RankParams",
     "Responses",
     "Samples",
+    "SceneAnchor",
     "SceneObject",
     "ScoringError",
     "SegmentOutcome",

@@ -64,7 +64,7 @@ def print_notes(notes: Sequence[str]) -> None:
 
 def print_scores(result: Mapping[str, Any]) -> None:
     """Print what ``score --json`` prints, for people: the two tables as columns, and the times."""
-    from uwbbench.config.detector import marked
+    from uwbbench.config.identity import marked
 
     label = "SIMULATED capture" if result["source"] == "simulated" else "capture"
     name = marked(result["detector"], results_file=result["results_file"] is not None)

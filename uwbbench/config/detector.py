@@ -194,9 +194,6 @@ class DetectorConfig:
 REFERENCE = "reference"
 """Fidelity of what stands beside detectors for comparison."""
 
-BOUND = "bound"
-"""How tables mark the rows of what is no detector, but bounds what detectors can reach."""
-
 
 def is_bound(config: DetectorConfig) -> bool:
     """Whether it only bounds what detectors can reach: it or a stage of it is a reference, or reads the truth."""
@@ -206,21 +203,6 @@ def is_bound(config: DetectorConfig) -> bool:
         stages.append(registry.load_plugin("mappers", config.mapper.use))
     seeing = any("truth" in stage.needs or stage.fidelity == REFERENCE for stage in stages)
     return seeing or config.fidelity == REFERENCE
-
-
-def marked(name: str, *, results_file: bool = False, bound: bool = False) -> str:
-    """Name of a detector as tables show it.
-
-    Parameters
-    ----------
-    name : str
-    results_file : bool
-        Whether its rows are read from a file.
-    bound : bool
-        Whether it bounds what detectors can reach, and is none.
-    """
-    marks = [*([RESULTS_FILE] if results_file else []), *([BOUND] if bound else [])]
-    return f"{name} ({', '.join(marks)})" if marks else name
 
 
 def read_detector(
