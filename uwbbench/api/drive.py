@@ -133,14 +133,17 @@ class Drive:
 
     @cached_property
     def header(self) -> CaptureHeader:
-        """The run without samples: truth, true poses at the steps, and the radar of the first receiver."""
+        """The run without samples: truth, true poses at the steps, and the radars of the receivers."""
         position_m, yaw_rad = np.empty((len(self), 3)), np.empty(len(self))
         for capture in reversed(self.captures):
             steps = self.steps[capture.radar.receiver]
             position_m[steps], yaw_rad[steps] = capture.trajectory.position_m, capture.trajectory.yaw_rad
         first = self.captures[0].header
         trajectory = Trajectory(self.time_s, position_m, yaw_rad)
-        return dataclasses.replace(first, name=self.name, trajectory=trajectory, recording=first.recording)
+        radars = tuple(self.radars.values())
+        return dataclasses.replace(
+            first, name=self.name, trajectory=trajectory, recording=first.recording, radars=radars
+        )
 
     @cached_property
     def sha256(self) -> str:
