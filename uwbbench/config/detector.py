@@ -137,6 +137,8 @@ class DetectorConfig:
         What makes poses and a map of a run; the steps are then the front end of each receiver.
     fronts : dict of tuples of Step
         Steps of the receivers whose front end differs; no part of the resolved file, whose mapper says how it does.
+    trajectories : bool
+        Whether ``results`` holds trajectories of runs.
     """
 
     name: str
@@ -149,15 +151,29 @@ class DetectorConfig:
     reported: tuple[ReportedFigures, ...] = field(default=(), compare=False)
     mapper: MapperUse | None = None
     fronts: dict[str, tuple[Step, ...]] = field(default_factory=dict, compare=False, repr=False)
+    trajectories: bool = field(default=False, compare=False)
 
     def front(self, receiver: str) -> DetectorConfig:
         """Front end of a receiver of a run: a detector without the mapper."""
         return dataclasses.replace(self, steps=self.fronts.get(receiver, self.steps), mapper=None, fronts={})
 
+    @property
+    def of_runs(self) -> bool:
+        """Whether it answers for whole runs, with poses and perhaps a map, and not for single captures."""
+        return self.mapper is not None or self.trajectories
+
     @classmethod
-    def of_results(cls, name: str, folder: Path) -> DetectorConfig:
-        """Detector that is known by what it has written alone."""
-        return cls(name, (), fidelity=RESULTS_FILE, results=folder)
+    def of_results(cls, name: str, folder: Path, *, trajectories: bool = False) -> DetectorConfig:
+        """Detector that is known by what it has written alone.
+
+        Parameters
+        ----------
+        name : str
+        folder : Path
+        trajectories : bool
+            Whether it has written the trajectories of runs.
+        """
+        return cls(name, (), fidelity=RESULTS_FILE, results=folder, trajectories=trajectories)
 
     def to_dict(self) -> dict[str, Any]:
         """Resolved file as plain values: what a manifest stores and an identity is made of."""
