@@ -165,7 +165,7 @@ class MapperLoop:
 
     @property
     def rows(self) -> Detections:
-        """Rows of all front ends so far, where they are kept: in the order of steps, with the place of their receiver."""
+        """Rows of all front ends so far, where they are kept: by step, with the place of their receiver."""
         return Detections.join(self._rows) if self._rows else Detections.empty()
 
     @property
