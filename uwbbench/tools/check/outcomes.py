@@ -129,7 +129,7 @@ def _presence(plain: Outcome) -> PresenceOutcome:
 
 def _poses(plain: Outcome) -> PoseOutcome:
     """A run whose poses are off by the errors of the frames, and by a metre where one is missed or false."""
-    off_m = 1.0 * (plain.fn + plain.fp)
+    off_m = (plain.fn + plain.fp).astype(np.float64)
     np.add.at(off_m, plain.error_frame[plain.matched], plain.error_m[plain.matched])
     rows = np.arange(FRAMES)
     return PoseOutcome(
