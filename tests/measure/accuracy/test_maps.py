@@ -106,8 +106,8 @@ def brute_matches(places, posts, gate_m):
 @settings(max_examples=15, deadline=None)
 def test_as_many_landmarks_as_possible_are_matched(seed):
     rng = np.random.default_rng(seed)
-    posts = rng.uniform(1, 1.8, (4, 2)) + [1.5, 0]
-    places = rng.uniform(1, 1.8, (4, 2)) + [1.5, 0]
+    posts = rng.uniform((2.5, 1), (3.3, 1.8), (4, 2))
+    places = rng.uniform((2.5, 1), (3.3, 1.8), (4, 2))
     block = scored(Map(landmarks(places)), room(*(post(*place) for place in posts)))
     assert 4 * block.landmark_recall == pytest.approx(brute_matches(places, posts, 0.3))
 

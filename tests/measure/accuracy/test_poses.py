@@ -18,7 +18,6 @@ from uwbbench.measure.accuracy.scoring import outcomes, score
 from uwbbench.measure.accuracy.stats import estimated, evaluate, paired_difference
 from uwbbench.measure.accuracy.trajectories import Motion
 
-
 STEPS = 200
 
 
@@ -127,7 +126,7 @@ def test_a_capture_without_labelled_objects_has_true_poses_all_the_same():
 
 @pytest.mark.parametrize("scoring", ["pose", "map"])
 def test_detections_without_a_mapper_are_refused_with_what_would_do(scoring):
-    with pytest.raises(ScoringError, match="hands out no poses and no map.*score it by 'frame'"):
+    with pytest.raises(ScoringError, match=r"hands out no poses and no map.*score it by 'frame'"):
         score(Detections([0], range_m=[2.0], processed=np.arange(STEPS)), circle(), scoring)
 
 
