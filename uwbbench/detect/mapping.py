@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -27,7 +28,7 @@ from uwbbench.api.frames import BATCH_FRAMES, Frames
 from uwbbench.api.mapper import Map, Mapped, Mapper, Poses, Step
 from uwbbench.api.stage import Stage
 from uwbbench.api.truth import Trajectory
-from uwbbench.config.detector import DetectorConfig
+from uwbbench.config.detector import DetectorConfig, read_detector
 from uwbbench.detect.hand_out import with_hand_outs
 from uwbbench.detect.pipeline import Pipeline
 from uwbbench.detect.stream import Stream
@@ -360,3 +361,25 @@ class MappingPipeline:
             own[steps[found.processed]] = after
             ready = np.maximum(ready, np.maximum.accumulate(own))
         return ready
+
+
+def load_mapper(
+    name: str | Path, relative_to: Path | None = None, changes: Mapping[str, Any] | None = None
+) -> MappingPipeline:
+    """Load a detector that has a mapper.
+
+    Parameters
+    ----------
+    name : str or Path
+        A shipped or registered name, or a path to a detector YAML.
+    relative_to : Path, optional
+        Folder that a relative path starts from.
+    changes : mapping, optional
+        Values to change, by path, for example ``{"mapper.params.gate": 9.21}``.
+
+    Raises
+    ------
+    ConfigError, PluginError
+        If the file is missing or wrong, or has no mapper.
+    """
+    return MappingPipeline(read_detector(str(name), relative_to, changes))
