@@ -83,6 +83,8 @@ class CaptureHeader:
         (:mod:`uwbbench.api.recording`). The name without its receiver if left out.
     robot : str
         Identity of the robot, whose ringing is in every frame; empty where it is not known.
+    radars : tuple of Radar
+        Of a run: those of all its receivers. Empty: the radar alone.
     """
 
     name: str
@@ -95,6 +97,7 @@ class CaptureHeader:
     description: str = ""
     recording: str = ""
     robot: str = ""
+    radars: tuple[Radar, ...] = ()
 
     def __post_init__(self) -> None:
         if not self.recording:
@@ -206,6 +209,10 @@ class Capture(CaptureHeader):
             raise CaptureError(
                 f"capture '{self.name}': timestamp_s must be finite and not decrease; frame {bad} breaks that"
             )
+        if self.anchors is not None:
+            outside = self.anchors.frame[(self.anchors.frame < 0) | (self.anchors.frame >= frames)]
+            if len(outside):
+                raise CaptureError(f"capture '{self.name}': an anchor is heard in frame {outside[0]} of {frames}")
         if self.background is not None:
             self._check_background(self.background)
 
