@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from uwbbench.api.capture_file import open_capture
     from uwbbench.api.capture_writing import write_capture
     from uwbbench.api.registry import register
+    from uwbbench.detect.mapping import load_mapper
     from uwbbench.detect.pipeline import detector_from_yaml, load_detector
     from uwbbench.detect.results_file import read_results
     from uwbbench.measure.accuracy.scoring import score
@@ -41,6 +42,7 @@ __all__ = [
     "gate",
     "leaderboard",
     "load_detector",
+    "load_mapper",
     "open_capture",
     "open_dataset",
     "open_run",
@@ -61,6 +63,7 @@ _HOME = {
     "calibrate": "uwbbench.measure.calibration",
     "detector_from_yaml": "uwbbench.detect.pipeline",
     "load_detector": "uwbbench.detect.pipeline",
+    "load_mapper": "uwbbench.detect.mapping",
     "read_results": "uwbbench.detect.results_file",
     "score": "uwbbench.measure.accuracy.scoring",
     "fit_scene": "uwbbench.tools.fit.library",

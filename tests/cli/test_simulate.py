@@ -121,3 +121,16 @@ def test_a_background_is_written_beside_each_receiver_and_shown(uwbbench, scene,
     assert receiver["background"] == {"name": "room/1 background", "frames": 81, "invalid_frames": 0}
     assert "81 frames" in uwbbench("info", "room.h5").stdout
     assert "background" not in uwbbench("simulate", scene.name, "-o", "alone.h5").stdout
+
+
+def test_anchors_are_written_and_counted(uwbbench, scene, tmp_path: Path) -> None:
+    heard = SCENE.replace("{use: noise}]", "{use: noise}, {use: anchor.messages}]")
+    (tmp_path / "heard.yaml").write_text(heard + "anchors: [{id: 4, position_m: [3, 1]}, {id: 5, drop_at_m: 0.2}]\n")
+    uwbbench("simulate", "heard.yaml", "-o", "heard.h5")
+    messages = len(open_capture(tmp_path / "heard.h5").anchors.messages)
+    receiver = json.loads(uwbbench("info", "heard.h5", "--json").stdout)["receivers"][0]
+    assert receiver["anchors"] == {"count": 2, "messages": messages}
+    assert messages > 10
+    assert f"2, {messages} messages" in uwbbench("info", "heard.h5").stdout
+    uwbbench("simulate", scene.name, "-o", "room.h5")
+    assert "messages" not in uwbbench("info", "room.h5").stdout

@@ -187,7 +187,7 @@ def _check_odometry(capture: Capture) -> None:
 def _check_agreement(first: Capture, other: Capture) -> None:
     """Refuse two receivers that cannot have been on one robot at one time.
 
-    Where both have a frame at one time, their odometry must agree; in between it must lie by the way from frame to frame.
+    Where both have a frame at one time, their odometry must agree; in between it must lie by the way between frames.
     """
     pair = f"captures '{first.name}' and '{other.name}' are no receivers of one run"
     times = [capture.trajectory.timestamp_s for capture in (first, other)]

@@ -200,6 +200,10 @@ def _background(background: Any) -> dict[str, Any]:
     return {"name": background.name, "frames": len(background), "invalid_frames": _invalid(background)}
 
 
+def _anchors(anchors: Any) -> dict[str, Any]:
+    return {"count": len(anchors.identity), "messages": len(anchors.messages)}
+
+
 def _receiver(capture: Any) -> dict[str, Any]:
     radar = capture.radar
     return {
@@ -218,17 +222,22 @@ def _receiver(capture: Any) -> dict[str, Any]:
         "array_spacing_m": radar.array_spacing_m,
         "first_tap_delay_s": radar.first_tap_delay_s,
         "background": None if capture.background is None else _background(capture.background),
+        "anchors": None if capture.anchors is None else _anchors(capture.anchors),
     }
 
 
 def receiver_texts(receivers: list[dict[str, Any]]) -> list[dict[str, str]]:
     """A row of a table for each receiver, numbers with units."""
-    with_background = any(receiver["background"] for receiver in receivers)
-    return [_receiver_text(receiver, with_background) for receiver in receivers]
+    shown = [name for name in ("background", "anchors") if any(receiver[name] for receiver in receivers)]
+    return [_receiver_text(receiver, shown) for receiver in receivers]
 
 
-def _receiver_text(receiver: dict[str, Any], with_background: bool) -> dict[str, str]:
-    background = f"{receiver['background']['frames']} frames" if receiver["background"] else "none"
+def _receiver_text(receiver: dict[str, Any], shown: list[str]) -> dict[str, str]:
+    background, anchors = receiver["background"], receiver["anchors"]
+    more = {
+        "background": f"{background['frames']} frames" if background else "none",
+        "anchors": f"{anchors['count']}, {anchors['messages']} messages" if anchors else "none",
+    }
     return {
         "receiver": receiver["receiver"],
         "frames": str(receiver["frames"]),
@@ -239,7 +248,7 @@ def _receiver_text(receiver: dict[str, Any], with_background: bool) -> dict[str,
         "first path": "reported" if receiver["first_path"] else "not reported",
         "range window": f"{receiver['window_m']:.2f} m",
         "TX to RX": f"{receiver['baseline_m']:.3f} m",
-        **({"background": background} if with_background else {}),
+        **{name: more[name] for name in shown},
     }
 
 

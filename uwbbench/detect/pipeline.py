@@ -109,7 +109,7 @@ class Pipeline:
         if self.config.mapper is not None:
             raise ConfigError(
                 f"detector '{self.name}' answers for a run with poses and a map, not for single captures; "
-                "'uwbbench run' with the scorings pose and map runs it"
+                "'uwbbench run' with the scorings pose and map runs it, and uwbbench.load_mapper in Python"
             )
         steps, notes = self._opened(capture)
         if fused and not audit:

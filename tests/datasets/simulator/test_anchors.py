@@ -141,7 +141,7 @@ def test_lost_frames_lose_their_messages_and_repeated_ones_bring_them_once(heard
 
 def test_a_term_that_loses_frames_before_messages_are_heard_is_refused(run_scene):
     terms = [*NOISE, {"use": "frames.lost", "params": {"share": 0.5}}, {"use": "anchor.messages"}]
-    with pytest.raises(CaptureError, match=r"'anchor.messages' must stand before"):
+    with pytest.raises(CaptureError, match=r"'anchor.messages' must come before the terms that lose"):
         run_scene(terms, radar=RADAR, trajectory=OUT, anchors=[FORE])
 
 

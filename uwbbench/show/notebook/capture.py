@@ -31,6 +31,8 @@ def capture(shown: CaptureHeader) -> str:
     }
     if isinstance(shown, Capture) and shown.background is not None:
         facts["background"] = f"{len(shown.background)} frames with nothing in view"
+    if isinstance(shown, Capture) and shown.anchors is not None:
+        facts["anchors"] = f"{len(shown.anchors.identity)}, of which {len(shown.anchors.messages)} messages were heard"
     image = _radargram(shown) if isinstance(shown, Capture) else ""
     return elements.frame("capture", shown.name, elements.facts(facts), image, simulated=shown.source == "simulated")
 

@@ -28,7 +28,7 @@ from uwbbench.show.page.timed import COLUMNS, timed_cells
 from uwbbench.show.text.numbers import rounded
 from uwbbench.show.text.quantity import Quantity
 from uwbbench.show.text.sheet import labels
-from uwbbench.show.text.wording import TABLES, set_aside_warning
+from uwbbench.show.text.wording import set_aside_warning, table_name
 
 
 class Content:
@@ -214,7 +214,7 @@ class Content:
         return {
             "dataset": f"{self.datasets[dataset]} ({source})",
             "scoring": scoring,
-            "table": TABLES[table],
+            "table": table_name(scoring, table),
             "columns": metrics.defined(exhaustive=exhaustive),
             "main": metrics.ranking(exhaustive=exhaustive),
             "cuts": same,

@@ -63,7 +63,7 @@ class AnchorMessages(Term[AnchorMessagesParams]):
         """Add the messages, frame by frame."""
         view, p = self._view, self.params
         if len(capture) != len(view):
-            raise CaptureError("term 'anchor.messages' must stand before those that lose or repeat frames")
+            raise CaptureError("term 'anchor.messages' must come before the terms that lose or repeat frames")
         heard = [self._heard(anchor, view, rng) for anchor in view.anchors]
         frame = np.concatenate([np.zeros(0, np.int64), *heard])
         which = np.repeat(np.arange(len(heard)), [len(frames) for frames in heard])
