@@ -39,7 +39,7 @@ def test_a_package_is_written_and_the_next_steps_are_told(uwbbench, tmp_path) ->
         (("new", "stage", "peaks"), "stage 'peaks' is taken by uwbbench"),
         (("new", "term", "mine"), "'term' is not one of"),
         (("new", "stage"), "Missing argument"),
-        (("check", "peeks"), "no stage, detector, dataset or metric named 'peeks'. Did you mean 'peaks'?"),
+        (("check", "peeks"), "no stage, mapper, detector, dataset or metric named 'peeks'. Did you mean 'peaks'?"),
         (("check", "absent.yaml"), "absent.yaml"),
         (("check", "peaks", "--kind", "metric"), "no metric named 'peaks'"),
         (("check", "peaks", "--only", "same-twiec"), "Did you mean 'same-twice'?"),
@@ -94,7 +94,7 @@ def test_a_detector_file_is_checked(uwbbench, detector) -> None:
     assert "1 passed, 1 failed" in out
 
 
-@pytest.mark.parametrize("kind", ["stage", "detector", "dataset", "metric"])
+@pytest.mark.parametrize("kind", ["stage", "mapper", "detector", "dataset", "metric"])
 def test_checks_are_listed_with_what_and_why(uwbbench, kind) -> None:
     out = uwbbench("check", "--list", "--kind", kind).stdout
     listed = json.loads(uwbbench("check", "--list", "--kind", kind, "--json").stdout)

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from uwbbench.api.compiling import compiled, inlined
     from uwbbench.api.dataset import Card, Dataset, DatasetFile, DatasetFolder
     from uwbbench.api.detections import COLUMNS, Detections
-    from uwbbench.api.drive import Drive, odometry_of, relative
+    from uwbbench.api.drive import Drive, compose, odometry_of, relative
     from uwbbench.api.errors import (
         CaptureError,
         ConfigError,
@@ -57,7 +57,7 @@ if TYPE_CHECKING:
     from uwbbench.api.recording import leak_key, leaks, simulated_recording
     from uwbbench.api.registry import load_plugin
     from uwbbench.api.stage import Fidelity, Filter, P, Params, Stage, ports
-    from uwbbench.api.term import EchoFading, EchoTail, Paths, Pulse, Responses, SceneObject, Term, View
+    from uwbbench.api.term import EchoFading, EchoTail, Paths, Pulse, Responses, SceneAnchor, SceneObject, Term, View
     from uwbbench.api.trial import StagesOnTrial, exact_ulps
     from uwbbench.api.truth import Obstacle, Sight, Trajectory, Truth
     from uwbbench.api.yaml_file import YamlFile, read_yaml
@@ -75,7 +75,7 @@ _HOME = {
     "compiling": ("compiled", "inlined"),
     "dataset": ("Card", "Dataset", "DatasetFile", "DatasetFolder"),
     "detections": ("COLUMNS", "Detections"),
-    "drive": ("Drive", "odometry_of", "relative"),
+    "drive": ("Drive", "compose", "odometry_of", "relative"),
     "errors": ("CaptureError", "ConfigError", "PluginError", "ScoringError", "StoreError", "UwbbenchError", "nearest"),
     "filters": ("Limit", "LimitFilter", "RankFilter", "RankParams"),
     "frames": ("Frames", "magnitude"),
@@ -103,7 +103,7 @@ _HOME = {
     "recording": ("leak_key", "leaks", "simulated_recording"),
     "registry": ("load_plugin",),
     "stage": ("Fidelity", "Filter", "P", "Params", "Stage", "ports"),
-    "term": ("EchoFading", "EchoTail", "Paths", "Pulse", "Responses", "SceneObject", "Term", "View"),
+    "term": ("EchoFading", "EchoTail", "Paths", "Pulse", "Responses", "SceneAnchor", "SceneObject", "Term", "View"),
     "trial": ("StagesOnTrial", "exact_ulps"),
     "truth": ("Obstacle", "Sight", "Trajectory", "Truth"),
     "yaml_file": ("YamlFile", "read_yaml"),
@@ -168,6 +168,7 @@ __all__ = [
     "RankParams",
     "Responses",
     "Samples",
+    "SceneAnchor",
     "SceneObject",
     "ScoringError",
     "SegmentOutcome",
@@ -194,6 +195,7 @@ __all__ = [
     "cases_of",
     "checked",
     "compiled",
+    "compose",
     "direction",
     "exact_ulps",
     "expect_arrays",

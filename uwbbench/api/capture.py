@@ -206,6 +206,10 @@ class Capture(CaptureHeader):
             raise CaptureError(
                 f"capture '{self.name}': timestamp_s must be finite and not decrease; frame {bad} breaks that"
             )
+        if self.anchors is not None:
+            outside = self.anchors.frame[(self.anchors.frame < 0) | (self.anchors.frame >= frames)]
+            if len(outside):
+                raise CaptureError(f"capture '{self.name}': an anchor is heard in frame {outside[0]} of {frames}")
         if self.background is not None:
             self._check_background(self.background)
 

@@ -3,7 +3,8 @@
 One HDF5 file holds one run of one radar with one or more receivers. Arrays are contiguous and uncompressed, so that
 they are read where they lie through a memory map; chunked or compressed arrays are read through HDF5. Files with
 objects that move carry version 1.1, which adds a frame axis to ``outline_m``; files with a background version 1.2,
-which adds the attribute ``background`` of a receiver; everything else is version 1.0.
+which adds the attribute ``background`` of a receiver; files with anchors version 1.3, which adds the groups
+``/anchors`` and ``anchors`` of a receiver; everything else is version 1.0.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from typing import Any, cast
 import h5py
 import numpy as np
 
+from uwbbench.api.anchor_file import read_anchors
 from uwbbench.api.arrays import FloatArray
 from uwbbench.api.capture import Capture, Samples
 from uwbbench.api.errors import CaptureError, nearest
@@ -176,8 +178,9 @@ def open_capture(path: str | os.PathLike[str], receiver: str | None = None) -> C
         elif receiver not in receivers:
             raise reader.fail("/receivers", f"no receiver '{receiver}'.{nearest(receiver, receivers)}")
         capture = _read(reader, receiver, receivers, f"/receivers/{receiver}")
-        background = _background(reader, receiver)
-        return capture if background is None else dataclasses.replace(capture, background=background)
+        parts = {"background": _background(reader, receiver), "anchors": read_anchors(reader, receiver)}
+        more: dict[str, Any] = {name: part for name, part in parts.items() if part is not None}
+        return dataclasses.replace(capture, **more) if more else capture
     except CaptureError as error:
         text = str(error)
         raise (error if text.startswith(str(path)) else reader.fail(f"/receivers/{receiver}", text)) from None

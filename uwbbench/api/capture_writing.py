@@ -12,6 +12,7 @@ from typing import Any
 import h5py
 import numpy as np
 
+from uwbbench.api.anchor_file import same_places, write_anchors
 from uwbbench.api.capture import Capture
 from uwbbench.api.capture_file import FORMAT, RADAR, RECEIVER_OPTIONAL, TEXTS, TRACKS
 from uwbbench.api.errors import CaptureError
@@ -65,6 +66,8 @@ def _check_belong_together(target: Path, captures: Sequence[Capture]) -> None:
         differing = [name for name in RADAR if getattr(other.radar, name) != getattr(first.radar, name)]
         if _stored(first.truth) != _stored(other.truth):
             differing.append("truth")
+        if not all(same_places(other.anchors, one.anchors) for one in captures):
+            differing.append("anchors")
         differing += [name for name in ("recording", "robot") if getattr(other, name) != getattr(first, name)]
         if differing:
             names = f"'{first.radar.receiver}' and '{other.radar.receiver}'"
@@ -93,12 +96,15 @@ def _write(file: h5py.File, captures: Sequence[Capture]) -> None:
         if capture.background is not None:
             group.attrs["background"] = f"/backgrounds/{name}"
             _write_background(file.create_group(f"backgrounds/{name}"), capture.background)
+    write_anchors(file, captures)
     if first.truth is not None:
         _write_truth(file.create_group("truth"), first.truth)
 
 
 def _version(captures: Sequence[Capture]) -> str:
     """Least version of the format that has all that these captures hold."""
+    if any(capture.anchors is not None for capture in captures):
+        return "1.3"
     if any(capture.background is not None for capture in captures):
         return "1.2"
     truth = captures[0].truth

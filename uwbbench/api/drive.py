@@ -159,6 +159,13 @@ def odometry_of(capture: Capture) -> FloatArray:
     return np.column_stack([position_m[:, :2], yaw_rad])
 
 
+def compose(pose: FloatArray, moved: FloatArray) -> FloatArray:
+    """Pose (3,) that a robot is at after it has moved (3,), forward, leftward and turning, from a pose (3,)."""
+    cosine, sine = np.cos(pose[2]), np.sin(pose[2])
+    x, y = cosine * moved[0] - sine * moved[1], sine * moved[0] + cosine * moved[1]
+    return np.array([pose[0] + x, pose[1] + y, pose[2] + moved[2]])
+
+
 def relative(start: FloatArray, end: FloatArray) -> FloatArray:
     """Poses ``end`` (n, 3) as seen from the poses ``start`` (n, 3)."""
     cosine, sine = np.cos(start[:, 2]), np.sin(start[:, 2])

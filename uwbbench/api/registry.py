@@ -23,7 +23,7 @@ from uwbbench.api.interruption import by_plugin
 ClassKind = Literal["stages", "mappers", "datasets", "metrics", "terms", "kernels"]
 PluginKind = ClassKind | Literal["detectors"]
 Group = PluginKind | Literal["defaults", "cases"]
-AuthoredKind = Literal["stage", "detector", "dataset", "metric"]
+AuthoredKind = Literal["stage", "mapper", "detector", "dataset", "metric"]
 """Kinds, in the singular, that a package can be written for and that have conformance checks."""
 AUTHORED_KINDS: tuple[AuthoredKind, ...] = get_args(AuthoredKind)
 KINDS: tuple[PluginKind, ...] = ("stages", "mappers", "detectors", "datasets", "metrics", "terms")

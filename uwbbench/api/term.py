@@ -137,6 +137,28 @@ class SceneObject:
 
 
 @dataclass(frozen=True)
+class SceneAnchor:
+    """An anchor of a scene, as terms see it.
+
+    Attributes
+    ----------
+    identity : int
+    position_m : (2,) array
+        Where it stands in the world.
+    frame : int
+        First frame in which it stands there.
+    offset_m : (2,) array or None
+        Where the robot, in its own frame, believes that it has set it down in that frame. None for an anchor that has
+        always been there, and for receivers that do not report the robot's doing.
+    """
+
+    identity: int
+    position_m: FloatArray
+    frame: int = 0
+    offset_m: FloatArray | None = None
+
+
+@dataclass(frozen=True)
 class Paths:
     """Ways over which the signal reaches the receiver.
 
@@ -201,6 +223,7 @@ class View:
     array_phase : callable
         Phase in radians of the second antenna over the first, at azimuths of any shape.
     pulse : Pulse
+    anchors : tuple of SceneAnchor
     """
 
     radar: Radar
@@ -216,6 +239,7 @@ class View:
     receive_gain: Callable[[FloatArray], FloatArray]
     array_phase: Callable[[FloatArray], FloatArray]
     pulse: Pulse
+    anchors: tuple[SceneAnchor, ...] = ()
 
     def __len__(self) -> int:
         return len(self.timestamp_s)

@@ -32,7 +32,7 @@ def everything_named(name: str) -> dict[str, dict[str, Any]]:
         facts["detector"] = _detector(name)
     if not facts:
         known = [*shipped("detectors"), *(known for kind in registry.KINDS for known in registry.entries(kind))]
-        raise PluginError(f"no stage, detector, dataset, metric or term named '{name}'.{nearest(name, known)}")
+        raise PluginError(f"no stage, mapper, detector, dataset, metric or term named '{name}'.{nearest(name, known)}")
     return facts
 
 

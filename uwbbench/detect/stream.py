@@ -144,7 +144,8 @@ class Stream:
                 yield self.through(tail, index + 1)
 
     def _emit(self, block: Block) -> Detections:
-        self.answered = max(self.answered, block.frames.first + len(block.frames))
+        if len(block.frames):  # an empty block may begin anywhere
+            self.answered = block.frames.first + len(block.frames)
         return block.detections.annotated(processed=(block.frames.first, block.frames.valid), notes=self.notes)
 
     def through(self, block: Block, start: int = 0) -> Block:

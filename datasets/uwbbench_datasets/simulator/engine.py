@@ -20,6 +20,7 @@ from uwbbench.api import (
     Paths,
     Radar,
     Responses,
+    SceneAnchor,
     SceneObject,
     Term,
     Trajectory,
@@ -28,6 +29,7 @@ from uwbbench.api import (
     receiver_pose,
     simulated_recording,
 )
+from uwbbench_datasets.simulator.anchors import anchors_of
 from uwbbench_datasets.simulator.fidelity import Contribution, choose, described
 from uwbbench_datasets.simulator.scene import Scene
 from uwbbench_datasets.simulator.shapes import ObjectModel
@@ -119,14 +121,18 @@ def simulate(scene: Scene, run: int = 1, *, background: bool = False, threads: i
     scene = scene.of_run(run)
     trajectory = sampled(scene.model.trajectory, scene.model.radar.frame_rate_hz, scene.folder)
     objects = tuple(item.moving(trajectory.timestamp_s, _motion(scene, run, item)) for item in scene.model.objects)
+    anchors = anchors_of(scene.model.anchors, trajectory, scene.model.seed, (run, zlib.crc32(b"anchor")))
     captures, contributions = [], {}
     for receiver in scene.model.receivers:
-        capture, of_terms = _one_receiver(scene, run, receiver, trajectory, objects, threads)
+        capture, of_terms = _one_receiver(scene, run, receiver, trajectory, objects, anchors, threads)
+        if anchors and capture.anchors is None:
+            raise CaptureError(f"scene '{scene.name}' has anchors, but no term that hears them: add anchor.messages")
+        anchors = tuple(replace(anchor, offset_m=None) for anchor in anchors)  # the first receiver has reported it
         if background:
             structure = tuple(body for body in objects if body.structure)
-            empty, _ = _one_receiver(scene, run, receiver, trajectory, structure, threads, background=True)
+            empty, _ = _one_receiver(scene, run, receiver, trajectory, structure, (), threads, background=True)
             said = f"Simulated by uwbbench. {capture.name} without its objects, with noise of its own."
-            named = replace(empty, name=f"{empty.name} background", description=said)
+            named = replace(empty, name=f"{empty.name} background", description=said, anchors=None)
             capture = replace(capture, background=named)
         captures.append(capture)
         contributions[receiver] = of_terms
@@ -146,12 +152,13 @@ def _one_receiver(
     receiver: str,
     trajectory: Trajectory,
     objects: tuple[SceneObject, ...],
+    anchors: tuple[SceneAnchor, ...],
     threads: int,
     *,
     background: bool = False,
 ) -> tuple[Capture, tuple[Contribution, ...]]:
     parts = [_part(scene, run, receiver, index, background=background) for index in range(len(scene.terms))]
-    view = _view(scene, scene.radar(receiver), trajectory, objects)
+    view = _view(scene, scene.radar(receiver), trajectory, objects).replace(anchors=anchors)
     for part in [part for part in parts if part.has("prepare")]:
         started = time.perf_counter()
         view = part.term.prepare(view, part.rng("prepare"))

@@ -26,6 +26,7 @@ from uwbbench.api import (
     read_yaml,
     with_values,
 )
+from uwbbench_datasets.simulator.anchors import AnchorModel
 from uwbbench_datasets.simulator.by_channel import for_channel
 from uwbbench_datasets.simulator.radar import RadarModel, ReceiverModel
 from uwbbench_datasets.simulator.robot import Robot, read_robot
@@ -90,6 +91,9 @@ class SceneModel(SceneNames):
     )
     trajectory: TrajectoryModel
     objects: list[ObjectModel] = Field(default_factory=list)
+    anchors: list[AnchorModel] = Field(
+        default_factory=list, description="Radios of known identity, which the term anchor.messages hears."
+    )
     terms: list[TermUse] = Field(min_length=1, description="What frames are made of; the order counts in each hook.")
     fidelity: FidelityModel = FidelityModel()
     draw: dict[str, Annotated[list[float], Field(min_length=2, max_length=2)]] = Field(
@@ -109,7 +113,9 @@ class SceneModel(SceneNames):
 
     @model_validator(mode="after")
     def _names_differ(self) -> SceneModel:
-        for kind, names in (("object", [one.id for one in self.objects]), ("term", [one.name for one in self.terms])):
+        named: dict[str, list[Any]] = {"object": [one.id for one in self.objects]}
+        named |= {"anchor": [one.id for one in self.anchors], "term": [one.name for one in self.terms]}
+        for kind, names in named.items():
             twice = {name for name in names if names.count(name) > 1}
             if twice:
                 hint = "; name one of them with 'as'" if kind == "term" else ""

@@ -42,6 +42,8 @@ def received(capture: Capture, frames: int | None = None) -> Capture:
     capture.frames(0, count)  # a damaged file is named here
     parts: dict[str, Any] = {name: _copied(getattr(capture, name), count) for name in _SAMPLES if _has(capture, name)}
     parts |= {name: getattr(capture, name)[:count] for name in PER_FRAME if _has(capture, name)}
+    if capture.anchors is not None:
+        parts["anchors"] = capture.anchors.of_frames(np.arange(count))
     track = capture.trajectory
     poses = Trajectory(track.timestamp_s[:count], track.position_m[:count], track.yaw_rad[:count])
     return dataclasses.replace(capture, truth=None, trajectory=poses, **parts)
@@ -92,6 +94,8 @@ def _again(capture: Capture, frames: int) -> Capture:
     parts: dict[str, Any] = {name: _Again(getattr(capture, name), frames) for name in _SAMPLES if _has(capture, name)}
     lap, place = np.divmod(np.arange(frames), len(capture))
     parts |= {name: getattr(capture, name)[place] for name in PER_FRAME if _has(capture, name)}
+    if capture.anchors is not None:
+        parts["anchors"] = capture.anchors.of_frames(place)
     track = capture.trajectory
     lap_s = float(track.timestamp_s[-1] - track.timestamp_s[0]) + 1 / capture.radar.frame_rate_hz
     poses = Trajectory(track.timestamp_s[place] + lap * lap_s, track.position_m[place], track.yaw_rad[place])

@@ -1,4 +1,4 @@
-"""Conformance checks of plugins: what every stage, detector, dataset and metric must do, each with a name."""
+"""Conformance checks of plugins: what every stage, mapper, detector, dataset and metric must do, each with a name."""
 
 from uwbbench.tools.check.suite import Conformance, all_checks, checks_for, examine, kinds_of, subject_of
 

@@ -14,12 +14,15 @@ from uwbbench.api.case import STATUSES, Check, CheckResult, Examination, HardCas
 from uwbbench.api.errors import PluginError, nearest
 from uwbbench.api.locate import shipped
 from uwbbench.api.registry import AUTHORED_KINDS, AuthoredKind
+from uwbbench.config.detector import read_detector
 from uwbbench.measure.robustness import all_cases
 from uwbbench.tools.check import (
     conduct,
     dataset,
     declaration,
     detector,
+    mapper,
+    mapping,
     metric,
     source,
     stage_inputs,
@@ -28,12 +31,15 @@ from uwbbench.tools.check import (
 )
 from uwbbench.tools.check.dataset import DatasetSubject
 from uwbbench.tools.check.detector import DetectorSubject
+from uwbbench.tools.check.mapper import MapperSubject
+from uwbbench.tools.check.mapping import MappingSubject
 from uwbbench.tools.check.metric import MetricSubject
 from uwbbench.tools.check.stage_subject import StageSubject
 from uwbbench.tools.check.subject import Subject
 
 _SUBJECTS: dict[AuthoredKind, type[Subject]] = {
     "stage": StageSubject,
+    "mapper": MapperSubject,
     "detector": DetectorSubject,
     "dataset": DatasetSubject,
     "metric": MetricSubject,
@@ -48,10 +54,19 @@ _CHECKS: dict[AuthoredKind, tuple[Check, ...]] = {
         *conduct.CHECKS,
         *stage_inputs.CHECKS,
     ),
+    "mapper": (
+        *declaration.CHECKS,
+        declaration.origin_is_stated,
+        *source.CHECKS,
+        *mapper.CHECKS,
+        *conduct.CHECKS,
+    ),
     "detector": (*detector.CHECKS, *conduct.CHECKS),
     "dataset": (*declaration.CHECKS, *source.CHECKS, *dataset.CHECKS, *conduct.CHECKS),
     "metric": (declaration.docstring_says_what_it_is, *source.CHECKS, *metric.CHECKS, *conduct.CHECKS),
 }
+_OF_RUNS: tuple[Check, ...] = (*mapping.CHECKS, *conduct.CHECKS)
+"""Checks of a detector that has a mapper."""
 
 
 @dataclass(frozen=True)
@@ -80,8 +95,13 @@ def _row(result: CheckResult) -> dict[str, Any]:
 
 
 def all_checks(kind: AuthoredKind) -> tuple[Check, ...]:
-    """Every check of a kind of plugin, in order."""
+    """Every check of a kind of plugin, in order; of a detector, of one without a mapper."""
     return _CHECKS[kind] + (tuple(_of_detectors(case) for case in all_cases()) if kind == "detector" else ())
+
+
+def checks_of(subject: Subject) -> tuple[Check, ...]:
+    """Every check of a plugin, in order."""
+    return _OF_RUNS if isinstance(subject, MappingSubject) else all_checks(subject.kind)
 
 
 def _of_detectors(case: HardCase) -> Check:
@@ -105,7 +125,7 @@ def kinds_of(name: str) -> tuple[AuthoredKind, ...]:
     kinds = tuple(kind for kind in AUTHORED_KINDS if name in known[kind])
     if not kinds:
         every = [other for names in known.values() for other in names]
-        raise PluginError(f"no stage, detector, dataset or metric named '{name}'.{nearest(name, every)}")
+        raise PluginError(f"no stage, mapper, detector, dataset or metric named '{name}'.{nearest(name, every)}")
     return kinds
 
 
@@ -116,7 +136,7 @@ def subject_of(
 
     Parameters
     ----------
-    kind : {"stage", "detector", "dataset", "metric"}
+    kind : {"stage", "mapper", "detector", "dataset", "metric"}
     name : str
         Registered name; of a detector, also the path of its YAML file.
     params : mapping, optional
@@ -129,6 +149,8 @@ def subject_of(
     PluginError, ConfigError
         If it is unknown or cannot be loaded.
     """
+    if kind == "detector" and read_detector(name, changes=params).mapper is not None:
+        return MappingSubject(name, params, tuple(roots))
     return _SUBJECTS[kind](name, params, tuple(roots))
 
 
@@ -146,7 +168,7 @@ def examine(subject: Subject, names: Sequence[str] | None = None) -> Conformance
     ConfigError
         If there is no check of such a name.
     """
-    checks = all_checks(subject.kind)
+    checks = checks_of(subject)
     chosen = checks if names is None else select(checks, names, f"check of {subject.kind}s")
     return Conformance(tuple(one.judge(subject) for one in chosen), subject.kind, subject.name)
 
@@ -158,7 +180,7 @@ def checks_for(
 
     Parameters
     ----------
-    kind : {"stage", "detector", "dataset", "metric"}
+    kind : {"stage", "mapper", "detector", "dataset", "metric"}
     name : str
         Registered name.
     params : mapping, optional
@@ -183,7 +205,7 @@ def checks_for(
     >>> checks["unit-is-given"]()
     """
     subject = subject_of(kind, name, params, roots)
-    return [(one.name, partial(assert_conforms, one, subject)) for one in all_checks(kind)]
+    return [(one.name, partial(assert_conforms, one, subject)) for one in checks_of(subject)]
 
 
 def assert_conforms(one: Check, subject: Subject) -> None:

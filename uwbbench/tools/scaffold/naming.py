@@ -22,7 +22,7 @@ class PluginName:
     Parameters
     ----------
     kind : str
-        ``stage``, ``detector``, ``dataset`` or ``metric``.
+        ``stage``, ``mapper``, ``detector``, ``dataset`` or ``metric``.
     name : str
         Name to be registered, such as ``clutter.mine``.
 

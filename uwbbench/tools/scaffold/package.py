@@ -20,7 +20,7 @@ def write_package(kind: AuthoredKind, name: str, folder: Path) -> Path:
 
     Parameters
     ----------
-    kind : {"stage", "detector", "dataset", "metric"}
+    kind : {"stage", "mapper", "detector", "dataset", "metric"}
     name : str
         Name to be registered.
     folder : Path

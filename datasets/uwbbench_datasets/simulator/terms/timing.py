@@ -7,6 +7,7 @@ for each frame.
 from __future__ import annotations
 
 import dataclasses
+from typing import Any
 
 import numpy as np
 from pydantic import Field
@@ -26,8 +27,16 @@ _PER_FRAME = (
 
 
 def taken(capture: Capture, frame: IntArray | BoolArray) -> Capture:
-    """Capture of the given frames only: samples, times, poses and moving outlines stay together."""
-    parts = {name: getattr(capture, name)[frame] for name in _PER_FRAME if getattr(capture, name) is not None}
+    """Capture of the given frames only: samples, times, poses, messages and moving outlines stay together.
+
+    A frame that is delivered twice brings the messages of anchors once.
+    """
+    parts: dict[str, Any] = {
+        name: getattr(capture, name)[frame] for name in _PER_FRAME if getattr(capture, name) is not None
+    }
+    if capture.anchors is not None:
+        source = np.arange(len(capture))[frame]
+        parts["anchors"] = capture.anchors.of_frames(np.where(np.diff(source, prepend=-1) > 0, source, -1))
     track = capture.trajectory
     truth = capture.truth and Truth(
         tuple(
