@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
-
 import numpy as np
 
 from uwbbench.api import FloatArray, LandmarkKind, wrap_angle
@@ -30,7 +28,7 @@ class AnchorModel:
         By how much ranges are too long.
     """
 
-    kind: ClassVar[LandmarkKind] = "anchor"
+    kind: LandmarkKind = "anchor"
 
     def __init__(self, mount: FloatArray, said: tuple[int, ...], bias_m: float) -> None:
         self._mount, self._said, self._bias_m = mount, list(said), bias_m

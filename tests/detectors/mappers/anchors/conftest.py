@@ -123,3 +123,9 @@ def _after(pose: FloatArray, moved: FloatArray) -> FloatArray:
 def corridor() -> Callable[..., Corridor]:
     """``drive`` with changes of a :class:`Setting`."""
     return lambda **changes: drive(Setting(**changes))
+
+
+@pytest.fixture
+def radars() -> Callable[..., dict[str, Radar]]:
+    """``build_radars``."""
+    return build_radars
