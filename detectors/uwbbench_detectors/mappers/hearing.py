@@ -63,7 +63,7 @@ class Hearing:
 
     def __init__(self, params: AnchorParams, radars: Mapping[str, Radar]) -> None:
         self._params = params
-        self._models = {
+        self._models: dict[str, dict[tuple[int, ...], AnchorModel]] = {
             name: {
                 said: AnchorModel(
                     np.array([*radar.mount_position_m[:2], radar.mount_yaw_rad]), said, params.range_bias_m
