@@ -77,8 +77,8 @@ class CaptureFiles(Dataset[CaptureFilesParams]):
     """Capture files of one's own.
 
     A capture is named after its file, ``stem`` or, where the file has several receivers, ``stem/receiver``; where two
-    files have the same stem, their folders separate them. A broken file is listed like any other, so that it shows
-    up in results as a failure with its reason.
+    files have the same stem, their folders separate them. A file is one run of its receivers. A broken file is listed
+    like any other, so that it shows up in results as a failure with its reason.
     """
 
     card: ClassVar[Card] = Card(
@@ -100,15 +100,25 @@ class CaptureFiles(Dataset[CaptureFilesParams]):
         CaptureError
             If a pattern matches no file.
         """
-        names: list[str] = []
-        for stem, file in self._files.items():
-            try:
-                receivers = list_receivers(file)
-            except CaptureError:
-                receivers = ()  # opening it raises the error
-            wanted = [name for name in receivers if self.params.receiver in (None, name)]
-            names += [f"{stem}/{name}" for name in wanted] if len(receivers) > 1 and wanted else [stem]
-        return names
+        return [name for captures in self.runs().values() for name in captures]
+
+    def runs(self) -> dict[str, tuple[str, ...]]:
+        """One run a file, with a capture for each of its receivers.
+
+        Raises
+        ------
+        CaptureError
+            If a pattern matches no file.
+        """
+        return {stem: self._captures(stem, file) for stem, file in self._files.items()}
+
+    def _captures(self, stem: str, file: Path) -> tuple[str, ...]:
+        try:
+            receivers = list_receivers(file)
+        except CaptureError:
+            return (stem,)  # opening it raises the error
+        wanted = [name for name in receivers if self.params.receiver in (None, name)]
+        return tuple(f"{stem}/{name}" for name in wanted) if len(receivers) > 1 and wanted else (stem,)
 
     def scene(self, name: str) -> str:
         """The file: what several receivers on one robot saw together is one recording."""

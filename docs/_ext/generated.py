@@ -54,6 +54,18 @@ def _stages() -> Iterator[str]:
         yield from (f"* fidelity: {stage.fidelity}", "", *_table(stage), "")
 
 
+def _mappers() -> Iterator[str]:
+    """Every mapper with what it needs and its parameters."""
+    for name in sorted(registry.entries("mappers")):
+        mapper = registry.load_plugin("mappers", name)
+        yield from (f"## {name}", "", _plain(describe(mapper)), "")
+        for port in ("needs", "consumes"):
+            if getattr(mapper, port):
+                yield f"* {port}: {', '.join(f'`{one}`' for one in sorted(getattr(mapper, port)))}"
+        yield f"* receivers: {mapper.receivers} or more"
+        yield from (f"* fidelity: {mapper.fidelity}", "", *_table(mapper), "")
+
+
 def _datasets() -> Iterator[str]:
     """Every dataset with its card and parameters."""
     for name in sorted(registry.entries("datasets")):
@@ -78,7 +90,8 @@ def _detectors() -> Iterator[str]:
     """Every shipped detector with its description and chain."""
     for name in shipped("detectors"):
         config = load_detector(name).config
-        chain = " → ".join(f"`{step.label}`" for step in config.steps)
+        ends = [config.mapper.use] if config.mapper else []
+        chain = " → ".join(f"`{name}`" for name in [*(step.label for step in config.steps), *ends])
         yield from (f"## {name}", "", _plain(config.description), "", chain, "")
 
 
@@ -99,6 +112,7 @@ def _plain(text: object) -> str:
 _WRITERS: dict[str, Callable[[], Iterator[str]]] = {
     "commands": _commands,
     "stages": _stages,
+    "mappers": _mappers,
     "datasets": _datasets,
     "terms": _terms,
     "detectors": _detectors,

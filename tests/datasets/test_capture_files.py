@@ -120,3 +120,36 @@ def test_an_unknown_capture_suggests_the_nearest(tmp_path, short):
 def test_a_reference_to_a_file_opens_it_again(tmp_path, short, receiver):
     write_capture(tmp_path / "run.h5", short)
     assert CaptureRef.of_file(tmp_path / "run.h5", receiver).open().sha256 == short.sha256
+
+
+def driven(capture: Capture, name: str, **odometry) -> Capture:
+    track = capture.trajectory
+    usual = {"odometry_position_m": track.position_m, "odometry_yaw_rad": track.yaw_rad}
+    return dataclasses.replace(as_receiver(capture, name), **{**usual, **odometry})
+
+
+def test_a_file_is_one_run_of_all_its_receivers(tmp_path, short):
+    write_capture(tmp_path / "both.h5", driven(short, "left"), driven(short, "right"))
+    write_capture(tmp_path / "one.h5", driven(short, "front"))
+    found = dataset(tmp_path, files=["*.h5"])
+    assert found.runs() == {"both": ("both/left", "both/right"), "one": ("one",)}
+    drive = found.open_run("both", found.runs()["both"])
+    assert list(drive.radars) == ["left", "right"]
+    assert np.array_equal(drive.odometry[:, :2], short.trajectory.position_m[:, :2])
+    assert dataset(tmp_path, files=["both.h5"], receiver="right").runs() == {"both": ("both/right",)}
+
+
+def test_a_run_whose_receivers_disagree_is_refused_when_it_is_opened(tmp_path, short):
+    other = short.trajectory.position_m + 1.0
+    write_capture(tmp_path / "run.h5", driven(short, "left"), driven(short, "right", odometry_position_m=other))
+    found = dataset(tmp_path, files=["run.h5"])
+    with pytest.raises(CaptureError, match="no receivers of one run: their odometry differs by"):
+        found.open_run("run", found.runs()["run"])
+
+
+def test_a_broken_file_is_a_run_that_fails_when_it_is_opened(tmp_path):
+    (tmp_path / "bad.h5").write_bytes(b"nothing")
+    found = dataset(tmp_path, files=["*.h5"])
+    assert found.runs() == {"bad": ("bad",)}
+    with pytest.raises(CaptureError, match=r"bad\.h5: not a readable HDF5 file"):
+        found.open_run("bad", ("bad",))

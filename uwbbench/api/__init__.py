@@ -51,7 +51,7 @@ if TYPE_CHECKING:
     from uwbbench.api.mapper import LANDMARK_KINDS, Grid, LandmarkKind, Landmarks, Map, Mapped, Mapper, Poses, Step
     from uwbbench.api.metric import Metric, Outcome
     from uwbbench.api.numba_internals import as_tuple
-    from uwbbench.api.outcomes import PresenceOutcome, SegmentOutcome, TrackOutcome
+    from uwbbench.api.outcomes import MapOutcome, PoseOutcome, PresenceOutcome, SegmentOutcome, TrackOutcome
     from uwbbench.api.override import with_values
     from uwbbench.api.radar import CHANNEL_CENTER_HZ, Radar
     from uwbbench.api.recording import leak_key, leaks, simulated_recording
@@ -97,7 +97,7 @@ _HOME = {
     "mapper": ("LANDMARK_KINDS", "Grid", "LandmarkKind", "Landmarks", "Map", "Mapped", "Mapper", "Poses", "Step"),
     "metric": ("Metric", "Outcome"),
     "numba_internals": ("as_tuple",),
-    "outcomes": ("PresenceOutcome", "SegmentOutcome", "TrackOutcome"),
+    "outcomes": ("MapOutcome", "PoseOutcome", "PresenceOutcome", "SegmentOutcome", "TrackOutcome"),
     "override": ("with_values",),
     "radar": ("CHANNEL_CENTER_HZ", "Radar"),
     "recording": ("leak_key", "leaks", "simulated_recording"),
@@ -149,6 +149,7 @@ __all__ = [
     "Limit",
     "LimitFilter",
     "Map",
+    "MapOutcome",
     "Mapped",
     "Mapper",
     "Messages",
@@ -160,6 +161,7 @@ __all__ = [
     "Params",
     "Paths",
     "PluginError",
+    "PoseOutcome",
     "Poses",
     "PresenceOutcome",
     "Pulse",

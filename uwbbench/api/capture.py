@@ -83,6 +83,8 @@ class CaptureHeader:
         (:mod:`uwbbench.api.recording`). The name without its receiver if left out.
     robot : str
         Identity of the robot, whose ringing is in every frame; empty where it is not known.
+    radars : tuple of Radar
+        Of a run: those of all its receivers. Empty: the radar alone.
     """
 
     name: str
@@ -95,6 +97,7 @@ class CaptureHeader:
     description: str = ""
     recording: str = ""
     robot: str = ""
+    radars: tuple[Radar, ...] = ()
 
     def __post_init__(self) -> None:
         if not self.recording:

@@ -42,8 +42,12 @@ class Outcome:
     per_item : mapping of str to tuple of str
         Arrays whose first axis is items of another kind, such as detections, by the array that names each item's row
         among the scored frames.
+    of_run : bool
+        Whether it is of a run as a whole. A run is then one piece of evidence, whatever scene it is of, and metrics of
+        every scoring, which count detections, have no meaning.
     """
 
+    of_run: ClassVar[bool] = False
     per_frame: ClassVar[tuple[str, ...]] = ("group", "tp", "fp", "fn")
     per_item: ClassVar[Mapping[str, tuple[str, ...]]] = {"error_frame": ("error_m", "matched")}
 

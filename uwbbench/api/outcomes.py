@@ -106,3 +106,91 @@ class PresenceOutcome(Outcome):
     classes: tuple[str, ...] = ()
     true_class: IntArray
     said_class: IntArray
+
+
+@dataclass(frozen=True, kw_only=True)
+class PoseOutcome(Outcome):
+    """Errors of the poses of a run: a row of a frame is a pose. Nothing is counted, so that there are no detections.
+
+    Attributes
+    ----------
+    step : (poses,) int array
+        Step of the run that each pose is of.
+    aligned_m, start_m : (poses,) array
+        Distance from the true position: after the rigid motion that fits all positions best, and after the one that
+        puts the first pose on its true one.
+    heading_rad : (poses,) array
+        Signed error of the heading after the first of these motions.
+    nees : (poses,) array
+        Squared error of the pose over its covariance (:mod:`uwbbench.measure.accuracy.trajectories`); NaN where the
+        mapper does not say how sure it is.
+    nearest_m : (poses, 2) array
+        Along x and y, distance from a nearby true position, be it of another step.
+    pair_frame : (pairs,) int array
+        Row of the first pose of each pair that is 1 m of true travel apart.
+    moved_m, turned_rad : (pairs,) array
+        Error of the motion between the two: distance, and angle.
+    """
+
+    of_run: ClassVar[bool] = True
+    per_frame: ClassVar[tuple[str, ...]] = (
+        *Outcome.per_frame,
+        "step",
+        "aligned_m",
+        "start_m",
+        "heading_rad",
+        "nees",
+        "nearest_m",
+    )
+    per_item: ClassVar[Mapping[str, tuple[str, ...]]] = {
+        **Outcome.per_item,
+        "pair_frame": ("moved_m", "turned_rad"),
+    }
+
+    step: IntArray
+    aligned_m: FloatArray
+    start_m: FloatArray
+    heading_rad: FloatArray
+    nees: FloatArray
+    nearest_m: FloatArray
+    pair_frame: IntArray
+    moved_m: FloatArray
+    turned_rad: FloatArray
+
+
+@dataclass(frozen=True, kw_only=True)
+class MapOutcome(Outcome):
+    """What the map of a run has in common with what was there: one row, the run. ``tp``, ``fp``, ``fn`` are landmarks.
+
+    Attributes
+    ----------
+    duplicates : (1,) int array
+        Landmarks on an object that another landmark has.
+    shared_cells, covered_cells : (1,) int array
+        Cells of the plane that map and truth both take up, and those that either does.
+    map_frame, true_frame : (points,) int array
+        Zeros: all points are of the one row.
+    map_m : (points of the map,) array
+        Distance of each from the nearest point of what was there.
+    true_m : (points that were there,) array
+        Distance of each from the nearest point of the map; inf where that has none.
+    start : MapOutcome or None
+        The same with the first pose put on its true one, where this is after the motion that fits all positions best.
+    """
+
+    of_run: ClassVar[bool] = True
+    per_frame: ClassVar[tuple[str, ...]] = (*Outcome.per_frame, "duplicates", "shared_cells", "covered_cells")
+    per_item: ClassVar[Mapping[str, tuple[str, ...]]] = {
+        **Outcome.per_item,
+        "map_frame": ("map_m",),
+        "true_frame": ("true_m",),
+    }
+
+    duplicates: IntArray
+    shared_cells: IntArray
+    covered_cells: IntArray
+    map_frame: IntArray
+    map_m: FloatArray
+    true_frame: IntArray
+    true_m: FloatArray
+    start: MapOutcome | None = None

@@ -43,6 +43,9 @@ def _plugin(kind: Any, name: str) -> dict[str, Any]:
     if kind == "stages":
         facts["fidelity"] = cls.fidelity
         facts |= {port: sorted(getattr(cls, port)) for port in ("consumes", "produces", "removes", "needs")}
+    elif kind == "mappers":
+        facts |= {"fidelity": cls.fidelity, "receivers": cls.receivers}
+        facts |= {port: sorted(getattr(cls, port)) for port in ("consumes", "needs")}
     elif kind == "datasets":
         card = cls.card
         facts |= {key: getattr(card, key) for key in ("title", "origin", "license", "citation", "source", "folder")}
@@ -134,6 +137,8 @@ def detector_yaml(facts: dict[str, Any]) -> str:
     for step in facts["pipeline"]:
         line = yaml.safe_dump(_without_defaults(step), sort_keys=False, default_flow_style=True, width=10_000)
         text += f"  - {line}"
+    if "mapper" in facts:
+        text += "mapper: " + yaml.safe_dump(facts["mapper"], sort_keys=False, default_flow_style=True, width=10_000)
     return f"# resolved from {facts['file']}\n{text}"
 
 

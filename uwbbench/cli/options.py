@@ -21,6 +21,8 @@ class Scoring(StrEnum):
     TRACK = "track"
     SEGMENT = "segment"
     PRESENCE = "presence"
+    POSE = "pose"
+    MAP = "map"
 
 
 class Surface(StrEnum):

@@ -64,7 +64,7 @@ def print_notes(notes: Sequence[str]) -> None:
 
 def print_scores(result: Mapping[str, Any]) -> None:
     """Print what ``score --json`` prints, for people: the two tables as columns, and the times."""
-    from uwbbench.config.detector import marked
+    from uwbbench.config.identity import marked
 
     label = "SIMULATED capture" if result["source"] == "simulated" else "capture"
     name = marked(result["detector"], results_file=result["results_file"] is not None)
@@ -78,6 +78,8 @@ def print_scores(result: Mapping[str, Any]) -> None:
             "track": "the tracks have no positions",
             "segment": "segments have no positions",
             "presence": "presence has no positions",
+            "pose": "the mapper does not look back",
+            "map": "a map has one table",
         }
         why = reasons.get(result["scoring"], "the detector does not cluster positions")
         typer.echo(f"after mapping: n/a ({why})")
@@ -112,6 +114,8 @@ def _scores(blocks: Sequence[Mapping[str, Any]], scoring: str) -> Iterator[tuple
                 by.title,
                 [text or f"n/a ({_why_undefined(metric, block)})" for text, block in zip(texts, blocks, strict=True)],
             )
+    if not all("tp" in block for block in blocks):  # a run is judged as a whole
+        return
     yield "recall by chance", [number(block["chance_recall"], 3, reason="not defined here") for block in blocks]
     for key, title in _COUNTS.items():
         yield title, [str(block[key]) for block in blocks]

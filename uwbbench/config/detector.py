@@ -137,6 +137,8 @@ class DetectorConfig:
         What makes poses and a map of a run; the steps are then the front end of each receiver.
     fronts : dict of tuples of Step
         Steps of the receivers whose front end differs; no part of the resolved file, whose mapper says how it does.
+    trajectories : bool
+        Whether ``results`` holds trajectories of runs.
     """
 
     name: str
@@ -149,15 +151,29 @@ class DetectorConfig:
     reported: tuple[ReportedFigures, ...] = field(default=(), compare=False)
     mapper: MapperUse | None = None
     fronts: dict[str, tuple[Step, ...]] = field(default_factory=dict, compare=False, repr=False)
+    trajectories: bool = field(default=False, compare=False)
 
     def front(self, receiver: str) -> DetectorConfig:
         """Front end of a receiver of a run: a detector without the mapper."""
         return dataclasses.replace(self, steps=self.fronts.get(receiver, self.steps), mapper=None, fronts={})
 
+    @property
+    def of_runs(self) -> bool:
+        """Whether it answers for whole runs, with poses and perhaps a map, and not for single captures."""
+        return self.mapper is not None or self.trajectories
+
     @classmethod
-    def of_results(cls, name: str, folder: Path) -> DetectorConfig:
-        """Detector that is known by what it has written alone."""
-        return cls(name, (), fidelity=RESULTS_FILE, results=folder)
+    def of_results(cls, name: str, folder: Path, *, trajectories: bool = False) -> DetectorConfig:
+        """Detector that is known by what it has written alone.
+
+        Parameters
+        ----------
+        name : str
+        folder : Path
+        trajectories : bool
+            Whether it has written the trajectories of runs.
+        """
+        return cls(name, (), fidelity=RESULTS_FILE, results=folder, trajectories=trajectories)
 
     def to_dict(self) -> dict[str, Any]:
         """Resolved file as plain values: what a manifest stores and an identity is made of."""
@@ -178,9 +194,6 @@ class DetectorConfig:
 REFERENCE = "reference"
 """Fidelity of what stands beside detectors for comparison."""
 
-BOUND = "bound"
-"""How tables mark the rows of what is no detector, but bounds what detectors can reach."""
-
 
 def is_bound(config: DetectorConfig) -> bool:
     """Whether it only bounds what detectors can reach: it or a stage of it is a reference, or reads the truth."""
@@ -190,21 +203,6 @@ def is_bound(config: DetectorConfig) -> bool:
         stages.append(registry.load_plugin("mappers", config.mapper.use))
     seeing = any("truth" in stage.needs or stage.fidelity == REFERENCE for stage in stages)
     return seeing or config.fidelity == REFERENCE
-
-
-def marked(name: str, *, results_file: bool = False, bound: bool = False) -> str:
-    """Name of a detector as tables show it.
-
-    Parameters
-    ----------
-    name : str
-    results_file : bool
-        Whether its rows are read from a file.
-    bound : bool
-        Whether it bounds what detectors can reach, and is none.
-    """
-    marks = [*([RESULTS_FILE] if results_file else []), *([BOUND] if bound else [])]
-    return f"{name} ({', '.join(marks)})" if marks else name
 
 
 def read_detector(

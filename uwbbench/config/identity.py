@@ -1,4 +1,4 @@
-"""What a detector is, as one hash: its resolved file, and the sources of what it is made of."""
+"""What a detector is, as one hash and as a name in tables: its resolved file, and the sources of what it is made of."""
 
 from __future__ import annotations
 
@@ -49,3 +49,22 @@ def detector_identity(config: Mapping[str, Any], sources: Mapping[str, str]) -> 
             used[name] = sources[name]
     text = json.dumps({"detector": config, "sources": used}, sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()
+
+
+BOUND = "bound"
+"""How tables mark the rows of what is no detector, but bounds what detectors can reach."""
+
+
+def marked(name: str, *, results_file: bool = False, bound: bool = False) -> str:
+    """Name of a detector as tables show it.
+
+    Parameters
+    ----------
+    name : str
+    results_file : bool
+        Whether its rows are read from a file.
+    bound : bool
+        Whether it bounds what detectors can reach, and is none.
+    """
+    marks = [*([RESULTS_FILE] if results_file else []), *([BOUND] if bound else [])]
+    return f"{name} ({', '.join(marks)})" if marks else name

@@ -9,7 +9,7 @@ from pydantic import Discriminator, Field, Tag, ValidationInfo, field_validator
 
 from uwbbench.config.model import ConfigModel
 
-Scoring = Literal["frame", "peak", "object", "latest", "track", "segment", "presence"]
+Scoring = Literal["frame", "peak", "object", "latest", "track", "segment", "presence", "pose", "map"]
 """What counts as one chance to be right: a frame, a peak, an object in a frame, the latest answer, a track, ..."""
 
 Table = Literal["filtering", "mapping"]

@@ -116,14 +116,16 @@ class MapperLoop:
     mapper : Mapper
         Opened.
     drive : Drive
+    keep : bool
+        Keep the rows of the front ends for :attr:`rows`; a long stream goes without.
 
     Attributes
     ----------
     mapper : Mapper
     """
 
-    def __init__(self, receivers: list[_Receiver], mapper: Mapper[Any], drive: Drive) -> None:
-        self._receivers, self.mapper, self._drive = receivers, mapper, drive
+    def __init__(self, receivers: list[_Receiver], mapper: Mapper[Any], drive: Drive, *, keep: bool) -> None:
+        self._receivers, self.mapper, self._drive, self._keep = receivers, mapper, drive, keep
         self._next = 0
         self._rows: list[Detections] = []
 
@@ -163,7 +165,7 @@ class MapperLoop:
 
     @property
     def rows(self) -> Detections:
-        """Rows of all front ends so far, in the order of steps, with the place of their receiver."""
+        """Rows of all front ends so far, where they are kept: in the order of steps, with the place of their receiver."""
         return Detections.join(self._rows) if self._rows else Detections.empty()
 
     @property
@@ -200,6 +202,8 @@ class MapperLoop:
                         messages[name] = heard
             time_s, moved = float(self._drive.time_s[index]), self._drive.moved[index]
             poses.append(self.mapper.step(Step(index, time_s, moved, rows, messages)))
+        if not self._keep:
+            return Poses.join(poses)
         places = enumerate(found.values())
         every = Detections.join(
             [rows.with_columns(**{RECEIVER: np.full(len(rows), float(place))}) for place, rows in places]
@@ -259,12 +263,14 @@ class MappingPipeline:
                 f"which no step of the front end{where} makes"
             )
 
-    def open(self, drive: Drive) -> MapperLoop:
+    def open(self, drive: Drive, *, keep: bool = False) -> MapperLoop:
         """Start on a run.
 
         Parameters
         ----------
         drive : Drive
+        keep : bool
+            Keep the rows of the front ends for :attr:`MapperLoop.rows`.
 
         Raises
         ------
@@ -294,7 +300,7 @@ class MappingPipeline:
             mapper.show_truth(drive.header.truth, drive.header.trajectory)
         if unknown:
             mapper.note(f"front end of '{unknown[0]}' not used: the run has no such receiver")
-        return MapperLoop(receivers, mapper, drive)
+        return MapperLoop(receivers, mapper, drive, keep=keep)
 
     def run(self, drive: Drive, *, handed_out: bool = False, block: int = BATCH_FRAMES) -> Detections:
         """Poses and map of a whole run.
@@ -313,7 +319,7 @@ class MappingPipeline:
             Rows of all front ends, with the step as their ``frame`` and the column ``receiver``; ``processed`` are the
             steps that have a pose; ``mapped`` holds poses and map.
         """
-        loop = self.open(drive)
+        loop = self.open(drive, keep=True)
         sts = "sts" in loop.needs
         poses = Poses.join([*(loop.step(frames) for frames in drive.blocks(block, sts=sts)), loop.flush()])
         smoothed, learnt = loop.finish()

@@ -7,14 +7,20 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from uwbbench.api.capture import Capture
+from uwbbench.api.drive import Drive
 from uwbbench.api.errors import ScoringError, nearest
 from uwbbench.config.detector import DetectorConfig
 from uwbbench.config.identity import RESULTS, detector_identity
+from uwbbench.detect import trajectory_file
 from uwbbench.detect.results_file import SUFFIXES, ResultsFile, content_of, read_results
+from uwbbench.detect.trajectory_file import read_trajectory
+from uwbbench.detect.tum import SUFFIX as TUM
 
 
 class ResultsFolder:
-    """Results files of one detector: ``CAPTURE.csv`` or ``.parquet``, in a folder of the dataset's label or beside it.
+    """Results files of one detector, in a folder of the dataset's label or beside it.
+
+    They are ``CAPTURE.csv`` or ``.parquet``; of a detector of runs ``RUN.tum``.
 
     Parameters
     ----------
@@ -31,6 +37,7 @@ class ResultsFolder:
         if config.results is None:
             raise ValueError(f"detector '{config.name}' has stages, and no folder of results")
         self.config, self.folder = config, config.results
+        self.suffixes = (TUM,) if config.trajectories else SUFFIXES
 
     def file_of(self, dataset: str, capture: str) -> Path:
         """File about a capture.
@@ -48,7 +55,7 @@ class ResultsFolder:
             If there is none, or more than one in the same folder, or the name leads out of the folder.
         """
         for stem in (self.folder / dataset / capture, self.folder / capture):
-            tried = [stem.with_name(f"{stem.name}{suffix}") for suffix in SUFFIXES]
+            tried = [stem.with_name(f"{stem.name}{suffix}") for suffix in self.suffixes]
             there = [path for path in tried if path.is_file()]
             if len(there) > 1:
                 raise ScoringError(f"{there[0]}: {there[1].name} lies beside it; keep one of them")
@@ -56,26 +63,29 @@ class ResultsFolder:
                 raise ScoringError(f"{there[0]}: lies outside the folder of results {self.folder}")
             if there:
                 return there[0]
-        stems = [path.stem for suffix in SUFFIXES for path in self.folder.glob(f"*{suffix}")]
-        hint = nearest(capture, stems) if stems else " No CSV or Parquet file is there."
-        names = " or ".join(f"{capture}{suffix}" for suffix in SUFFIXES)
-        raise ScoringError(f"{self.folder}: no results for capture '{capture}' of '{dataset}': no {names}.{hint}")
+        stems = [path.stem for suffix in self.suffixes for path in self.folder.glob(f"*{suffix}")]
+        kinds = "TUM" if self.config.trajectories else "CSV or Parquet"
+        hint = nearest(capture, stems) if stems else f" No {kinds} file is there."
+        names = " or ".join(f"{capture}{suffix}" for suffix in self.suffixes)
+        what = "run" if self.config.trajectories else "capture"
+        raise ScoringError(f"{self.folder}: no results for {what} '{capture}' of '{dataset}': no {names}.{hint}")
 
-    def read(self, dataset: str, capture: str, opened: Capture) -> ResultsFile:
-        """What the file about a capture holds.
+    def read(self, dataset: str, capture: str, opened: Capture | Drive) -> ResultsFile:
+        """What the file about a capture or a run holds.
 
         Parameters
         ----------
         dataset, capture : str
             As in :meth:`file_of`.
-        opened : Capture
+        opened : Capture or Drive
 
         Raises
         ------
         ScoringError
             If there is no such file, or something in it cannot be right.
         """
-        return read_results(self.file_of(dataset, capture), opened)
+        path = self.file_of(dataset, capture)
+        return read_trajectory(path, opened) if isinstance(opened, Drive) else read_results(path, opened)
 
     def content(self, dataset: str, capture: str) -> str:
         """SHA-256 of the file about a capture; empty where it cannot be read.
@@ -86,7 +96,8 @@ class ResultsFolder:
             As in :meth:`file_of`.
         """
         try:
-            return content_of(self.file_of(dataset, capture))
+            path = self.file_of(dataset, capture)
+            return trajectory_file.content_of(path) if self.config.trajectories else content_of(path)
         except ScoringError:  # the unit itself will fail in the same way, and say so
             return ""
 

@@ -24,8 +24,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from uwbbench.api.errors import StoreError
-from uwbbench.config.detector import marked
-from uwbbench.config.identity import from_results
+from uwbbench.config.identity import from_results, marked
 from uwbbench.measure.accuracy.counts import reach_of_mean
 from uwbbench.measure.accuracy.metrics.choice import MetricChoice
 from uwbbench.measure.accuracy.scoring import column_of

@@ -15,6 +15,7 @@ from uwbbench.api.yaml_file import YamlFile
 from uwbbench.config.detector import DetectorConfig, read_detector
 from uwbbench.config.extends import placed
 from uwbbench.config.model import ConfigModel, DetectorName
+from uwbbench.detect.tum import SUFFIX as TUM
 
 
 class DetectorUse(ConfigModel):
@@ -26,9 +27,11 @@ class DetectorUse(ConfigModel):
 
 
 class ResultsUse(ConfigModel):
-    """What another program has found, in a folder of results files."""
+    """What another program has found, in a folder of results files: of captures, or, as TUM files, of runs."""
 
-    results: str = Field(min_length=1, description="Folder with CAPTURE.csv or .parquet for each capture.")
+    results: str = Field(
+        min_length=1, description="Folder with CAPTURE.csv or .parquet for each capture, or RUN.tum for each run."
+    )
     name: str | None = Field(default=None, min_length=1, description="Name in tables; the folder's if left out.")
 
 
@@ -110,7 +113,8 @@ def _stored(use: ResultsUse, place: str, folder: Path) -> DetectorConfig:
     results = folder / use.results
     if not results.is_dir():
         raise ConfigError(f"{place}: {results}: no such folder")
-    return DetectorConfig.of_results(use.name or results.resolve().name, results)
+    trajectories = next(results.rglob(f"*{TUM}"), None) is not None
+    return DetectorConfig.of_results(use.name or results.resolve().name, results, trajectories=trajectories)
 
 
 def named_detectors(items: Sequence[Any], folder: Path) -> dict[str, Any]:

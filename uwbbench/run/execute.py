@@ -343,6 +343,7 @@ class _Run:
         if finished.header is not None and finished.found is not None:
             self.folder.write_header(entry.capture_id, finished.header, finished.sha256)
             self.folder.write_detections(entry.unit, finished.found, finished.candidates)
+            self.folder.write_mapped(entry.unit, finished.found.mapped, finished.header.trajectory.timestamp_s)
             self.folder.write_curve(entry.unit, finished.curve, self._rules(entry.dataset)[0])
         if finished.times_us is not None:
             self.folder.write_times(entry.unit, finished.times_us, entry.facts.get(REPORTED_FACT, {}))

@@ -89,7 +89,7 @@ def plan(experiment: Experiment) -> Plan:
         chosen = [d for d in experiment.detectors if not source.detectors or d.name in source.detectors]
         try:
             references = source.references()
-            runs: list[RunRef] = source.runs() if any(d.mapper for d in chosen) else []
+            runs: list[RunRef] = source.runs() if any(d.of_runs for d in chosen) else []
             if source.optional:
                 references[0].open()
             scenes[source.label] = source.scenes([ref.name for ref in references])
@@ -115,8 +115,8 @@ def plan(experiment: Experiment) -> Plan:
         if experiment.frozen is not None and not source.optional:
             names = [ref.name for ref in references]
             experiment.frozen.check_names(source.label, names, all_of_them=not experiment.part.quick)
-        single = [d for d in chosen if d.mapper is None]
-        mapping = [d for d in chosen if d.mapper is not None]
+        single = [d for d in chosen if not d.of_runs]
+        mapping = [d for d in chosen if d.of_runs]
         pairs: list[tuple[CaptureRef | RunRef, DetectorConfig]] = [(ref, d) for ref in references for d in single]
         pairs += [(run, d) for run in runs for d in mapping]
         accuracy += [Unit("accuracy", d, source.label, ref) for ref, d in pairs]

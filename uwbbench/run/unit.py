@@ -159,7 +159,6 @@ def _detected(job: Job) -> Finished:
         pipeline, identity = _checked(job.session, unit.detector)
         detections = _found(pipeline, capture)
     else:
-        assert isinstance(capture, Capture)  # noqa: S101 - what another program has found is of captures
         stored, results = _read(unit, capture)
         detections, identity = stored.detections, ResultsFolder(unit.detector).identity(stored.sha256)
     header = capture.header
@@ -211,7 +210,7 @@ def _found(pipeline: Pipeline | MappingPipeline, capture: Capture | Drive) -> De
     return pipeline.run(capture, candidates=not pipeline.open(capture).fused, handed_out=True)
 
 
-def _read(unit: Unit, capture: Capture) -> tuple[ResultsFile, dict[str, Any]]:
+def _read(unit: Unit, capture: Capture | Drive) -> tuple[ResultsFile, dict[str, Any]]:
     """What another program has found, and facts about its file; its times are summed up as reported."""
     folder = ResultsFolder(unit.detector)
     stored = folder.read(unit.dataset, unit.ref.name, capture)

@@ -6,6 +6,7 @@ what a file looks like, not what is in other files: only ``uwbbench validate`` f
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any, Literal
 
 from pydantic import BaseModel
@@ -15,6 +16,7 @@ from uwbbench.api import registry
 from uwbbench.api.errors import PluginError
 from uwbbench.config.datasets import DatasetUse
 from uwbbench.config.detector import BY_CHANNEL, DetectorModel, StepModel
+from uwbbench.config.mapper import MapperModel
 from uwbbench.run.experiment import ExperimentModel, ScoredDataset
 from uwbbench.tools.fit.config import FitModel
 from uwbbench.tools.gate.config import GateModel
@@ -22,18 +24,57 @@ from uwbbench.tools.train.config import TrainModel
 from uwbbench.tools.tune.config import TuneModel
 
 Schema = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Choice:
+    """Part of a file that chooses a plugin of a kind by ``use``.
+
+    Attributes
+    ----------
+    part : type
+        Its model.
+    kind : str
+    by_channel : bool
+        Whether parameters may depend on the channel.
+    """
+
+    part: type[BaseModel]
+    kind: Literal["stages", "mappers", "datasets", "terms"]
+    by_channel: bool = False
+
+
+@dataclass(frozen=True)
+class _Found:
+    """Parameters of the plugins of a kind; beside those that cannot be loaded, which take no others' schema away."""
+
+    params: dict[str, type[BaseModel]]
+    broken: dict[str, str]
+
+    @classmethod
+    def of(cls, kind: Literal["stages", "mappers", "datasets", "terms"]) -> _Found:
+        found = cls({}, {})
+        for name in registry.entries(kind):
+            try:
+                found.params[name] = registry.load_plugin(kind, name).params_type()
+            except PluginError as error:
+                found.broken[name] = str(error)
+        return found
+
+
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 _ABOUT = ("title", "description", "default")
 
 
 def detector_schema() -> Schema:
     """JSON Schema of a detector file; each step's parameters follow from its ``use`` and may depend on the channel."""
-    return _file_schema(DetectorModel, StepModel, "stages", by_channel=True)
+    steps, mapper = Choice(StepModel, "stages", by_channel=True), Choice(MapperModel, "mappers")
+    return _file_schema(DetectorModel, steps, mapper)
 
 
 def experiment_schema() -> Schema:
     """JSON Schema of an experiment file; each dataset's parameters follow from its ``use``."""
-    schema = _file_schema(ExperimentModel, ScoredDataset, "datasets", by_channel=False)
+    schema = _file_schema(ExperimentModel, Choice(ScoredDataset, "datasets"))
     properties = schema["properties"]
     # The two short forms that the model accepts: `scoring: frame` and `latency: false`.
     properties["scoring"] = _or(properties["scoring"], properties["scoring"]["items"])
@@ -43,17 +84,17 @@ def experiment_schema() -> Schema:
 
 def gate_schema() -> Schema:
     """JSON Schema of a gate file; each dataset's parameters follow from its ``use``."""
-    return _file_schema(GateModel, DatasetUse, "datasets", by_channel=False)
+    return _file_schema(GateModel, Choice(DatasetUse, "datasets"))
 
 
 def tuning_schema() -> Schema:
     """JSON Schema of a tuning file; each dataset's parameters follow from its ``use``."""
-    return _file_schema(TuneModel, DatasetUse, "datasets", by_channel=False)
+    return _file_schema(TuneModel, Choice(DatasetUse, "datasets"))
 
 
 def training_schema() -> Schema:
     """JSON Schema of a training file; each dataset's parameters follow from its ``use``."""
-    return _file_schema(TrainModel, DatasetUse, "datasets", by_channel=False)
+    return _file_schema(TrainModel, Choice(DatasetUse, "datasets"))
 
 
 def fit_schema() -> Schema:
@@ -70,7 +111,7 @@ def scene_schema() -> Schema:
         If the dataset that reads scenes cannot be loaded.
     """
     simulator = registry.load_plugin("datasets", registry.default("dataset.scenes"))
-    schema = _file_schema(simulator.scene_model, simulator.term_model, "terms", by_channel=True)
+    schema = _file_schema(simulator.scene_model, Choice(simulator.term_model, "terms", by_channel=True))
     for part in (schema, *schema["$defs"].values()):
         own = part.get("properties", {})
         own |= {key: _or_by_channel(value) for key, value in own.items() if _may_differ(key, value)}
@@ -104,35 +145,15 @@ def _may_differ(key: str, value: Schema) -> bool:
     return not said and "const" not in value and key not in ("schema", "name", "vary", "channel")
 
 
-def _file_schema(
-    model: type[BaseModel], item: type[BaseModel], kind: Literal["stages", "datasets", "terms"], *, by_channel: bool
-) -> Schema:
-    """Schema of a file, whose items of one model choose a plugin by ``use`` and hold its ``params``."""
-    loaded: dict[str, type[BaseModel]] = {}
-    broken: dict[str, str] = {}
-    for name in registry.entries(kind):
-        try:
-            loaded[name] = registry.load_plugin(kind, name).params_type()
-        except PluginError as error:
-            broken[name] = str(error)  # shown beside the name: one broken plugin does not take the others' schema away
-    models = dict.fromkeys([model, *loaded.values()])
+def _file_schema(model: type[BaseModel], *choices: Choice) -> Schema:
+    """Schema of a file, parts of which choose a plugin by ``use`` and hold its ``params``."""
+    found = {choice: _Found.of(choice.kind) for choice in choices}
+    models = dict.fromkeys([model, *(params for each in found.values() for params in each.params.values())])
     places, whole = models_json_schema([(one, "validation") for one in models], by_alias=True)
     definitions: dict[str, Schema] = whole["$defs"]
-    names = {params: places[params, "validation"]["$ref"].rsplit("/", 1)[1] for params in loaded.values()}
-    for name in set(names.values()) if by_channel else ():
-        own = definitions[name].get("properties", {})
-        own |= {key: _or_by_channel(value) for key, value in own.items()}
-    choices = []
-    for name, params in loaded.items():
-        chosen: Schema = {"properties": {"params": places[params, "validation"]}}
-        if definitions[names[params]].get("required"):
-            chosen["required"] = ["params"]
-        choices.append({"if": {"properties": {"use": {"const": name}}, "required": ["use"]}, "then": chosen})
-    step = definitions[item.__name__]
-    step["properties"]["use"] |= {"enum": [*loaded, *broken]}
-    if broken:
-        step["properties"]["use"]["description"] += " " + " ".join(broken.values())
-    step["allOf"] = choices
+    for choice, each in found.items():
+        given = {name: places[params, "validation"] for name, params in each.params.items()}
+        _let_choose(definitions, choice, given, each.broken)
     file = definitions.pop(model.__name__)
     required = file.pop("required")
     if "extends" not in model.model_fields:
@@ -141,6 +162,39 @@ def _file_schema(
     inherits: Schema = {"if": {"anyOf": others}, "else": {"required": required}}
     inherits["dependentRequired"] = {"set": ["extends"]}
     return {"$schema": DIALECT, **file, **inherits, "$defs": definitions}
+
+
+def _let_choose(
+    definitions: dict[str, Schema], choice: Choice, given: dict[str, Schema], broken: dict[str, str]
+) -> None:
+    """Let a part of a file have the parameters of the plugin that its ``use`` names.
+
+    Parameters
+    ----------
+    definitions : dict
+        Of all models; changed in place.
+    choice : Choice
+    given : dict
+        Reference to the parameters of each plugin.
+    broken : dict
+        Why plugins cannot be loaded.
+    """
+    names = {name: reference["$ref"].rsplit("/", 1)[1] for name, reference in given.items()}
+    for name in set(names.values()) if choice.by_channel else ():
+        own = definitions[name].get("properties", {})
+        own |= {key: _or_by_channel(value) for key, value in own.items()}
+    rules = []
+    for name, reference in given.items():
+        chosen: Schema = {"properties": {"params": reference}}
+        if definitions[names[name]].get("required"):
+            chosen["required"] = ["params"]
+        rules.append({"if": {"properties": {"use": {"const": name}}, "required": ["use"]}, "then": chosen})
+    part = definitions[choice.part.__name__]
+    part["properties"]["use"] |= {"enum": [*given, *broken]}
+    if broken:
+        part["properties"]["use"]["description"] += " " + " ".join(broken.values())
+    if rules:
+        part["allOf"] = rules
 
 
 def _or_by_channel(value: Schema) -> Schema:

@@ -84,16 +84,25 @@ class Straight(Params):
 
 
 class Waypoints(Params):
-    """Straight legs between points at constant speed; the robot turns in an instant at each."""
+    """Straight legs between points at constant speed; at each point the robot turns on the spot."""
 
     kind: Literal["waypoints"]
     points_m: list[Point] = Field(min_length=2)
     speed_m_s: float = Field(0.3, gt=0)
     yaw_deg: float | None = Field(None, description="Heading; along each leg if left out.")
+    turn_deg_s: float | None = Field(None, gt=0, description="How fast it turns; in an instant if left out.")
+
+    @model_validator(mode="after")
+    def _turns(self) -> Waypoints:
+        if self.turn_deg_s is not None and self.yaw_deg is not None:
+            raise ValueError("a robot that keeps its heading (yaw_deg) does not turn: leave turn_deg_s out")
+        return self
 
     def sampled(self, rate_hz: float) -> Trajectory:
         """Pose at each frame."""
-        return _along(self.points_m, self.speed_m_s, self.yaw_deg, rate_hz)
+        if self.turn_deg_s is None:
+            return _along(self.points_m, self.speed_m_s, self.yaw_deg, rate_hz)
+        return _turning(self.points_m, self.speed_m_s, np.radians(self.turn_deg_s), rate_hz)
 
 
 class Arc(Params):
@@ -219,6 +228,22 @@ def _along(points: list[Point], speed_m_s: float, yaw_deg: float | None, rate_hz
         return _poses(times, position, np.radians(yaw_deg))
     leg = np.clip(np.searchsorted(reached, gone, side="right") - 1, 0, len(legs) - 1)
     return _poses(times, position, np.arctan2(legs[:, 1], legs[:, 0])[leg])
+
+
+def _turning(points: list[Point], speed_m_s: float, turn_rad_s: float, rate_hz: float) -> Trajectory:
+    """Legs between points, and turns on the spot by the shorter way from leg to leg."""
+    stops = np.stack([in_space(point) for point in points])
+    legs = np.diff(stops, axis=0)
+    heading = np.unwrap(np.arctan2(legs[:, 1], legs[:, 0]))
+    driven_s = np.linalg.norm(legs, axis=1) / speed_m_s
+    turned_s = np.abs(np.diff(heading)) / turn_rad_s
+    passed_s = np.zeros(2 * len(legs) - 1)  # a leg, a turn, a leg ...
+    passed_s[0::2], passed_s[1::2] = driven_s, turned_s
+    reached_s = np.concatenate([[0.0], np.cumsum(passed_s)])
+    times = _times(reached_s[-1], rate_hz)
+    place = np.concatenate([[0], np.repeat(np.arange(1, len(legs)), 2), [len(legs)]])
+    position = np.stack([np.interp(times, reached_s, stops[place, axis]) for axis in range(3)], axis=1)
+    return _poses(times, position, np.interp(times, reached_s, np.repeat(heading, 2)))
 
 
 def _read_poses(path: Path) -> dict[str, FloatArray]:

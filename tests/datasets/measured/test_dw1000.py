@@ -80,6 +80,29 @@ def test_a_reception_with_an_error_is_left_out(folder):
     np.testing.assert_array_equal(read_log(folder / "4.log").samples, SAMPLES[[0, 2]])
 
 
+def test_reported_distances_are_messages_of_the_tag_where_they_are_asked_for(folder):
+    assert apartment(folder).open("4").anchors is None
+    params = {"files": ["4.log"], "messages": True}
+    anchors = open_dataset("dw1000-apartment", params, [folder]).open("4").anchors
+    assert (anchors.identity.tolist(), anchors.position_m.tolist()) == ([2], [[4.0, 6.0]])
+    assert anchors.frame.tolist() == [0, 1]
+    assert anchors.messages.range_m.tolist() == [2.693148, 2.693148]
+    assert np.isnan(anchors.messages.azimuth_rad).all()
+
+
+def test_a_distance_before_the_first_reception_belongs_to_no_frame(folder):
+    (folder / "4.log").write_text(log().replace("\r\n", "\n").replace(HEAD, HEAD + "Anchor ToF: 1 ns Dist: 9.1 m\n"))
+    found = read_log(folder / "4.log")
+    assert found.distance_m.tolist() == [2.693148, 2.693148]
+
+
+def test_a_tag_without_a_number_has_no_messages(folder):
+    (folder / "pairs.csv").write_text("file_number,anchor_location,tag_location\n4,1,door\n")
+    (folder / "tags.csv").write_text("location,x,y\ndoor,4.0,6.0\n")
+    with pytest.raises(CaptureError, match=r"pairs\.csv: a message needs the number of a tag, not 'door'"):
+        open_dataset("dw1000-apartment", {"files": ["4.log"], "messages": True}, [folder]).open("4")
+
+
 FIRST = HEAD.count("\n") + 1  # line of the first 'RX OK'
 
 
@@ -192,3 +215,13 @@ def test_the_measured_log_is_cropped_so_that_the_crest_is_among_the_first_taps(d
     assert capture.preamble.shape == (252, 100)
     crest = np.argmax(np.abs(capture.preamble[:, :10]), axis=1)
     assert np.mean((crest >= BEFORE_TAPS) & (crest <= BEFORE_TAPS + 3)) > 0.95
+
+
+@pytest.mark.data
+def test_measured_distances_are_eighteen_centimetres_too_long(data_dir):
+    capture = open_dataset("dw1000-apartment", {"messages": True}, [data_dir]).open("1")
+    anchors = capture.anchors
+    true_m = np.hypot(*(anchors.position_m[0] - capture.trajectory.position_m[0, :2]))
+    assert len(anchors.messages) == 126
+    assert np.mean(anchors.messages.range_m) - true_m == pytest.approx(0.181, abs=5e-4)
+    assert np.std(anchors.messages.range_m, ddof=1) == pytest.approx(0.026, abs=5e-4)

@@ -41,6 +41,24 @@ def test_waypoints_are_passed_at_constant_speed() -> None:
     assert set(np.round(np.degrees(track.yaw_rad))) == {0.0, 90.0, 180.0}
 
 
+def test_a_robot_that_takes_its_time_turns_on_the_spot_by_the_shorter_way() -> None:
+    points = [[0, 0], [1, 0], [1, 1], [2, 1], [1, 1]]
+    track = made(kind="waypoints", points_m=points, speed_m_s=0.5, turn_deg_s=45)
+    for second, point, heading in ((2, [1, 0], 0), (3, [1, 0], 45), (4, [1, 0], 90), (6, [1, 1], 90), (8, [1, 1], 0)):
+        frame = int(second * RATE_HZ)
+        assert np.allclose(track.position_m[frame, :2], point)
+        assert np.degrees(track.yaw_rad[frame]) == pytest.approx(heading)
+    assert track.timestamp_s[-1] == pytest.approx(4 * 2 + 2 * 2 + 4)
+    moves, turns = speed(track) > 1e-9, np.abs(np.diff(track.yaw_rad)) > 1e-9
+    assert not np.any(moves & turns)
+    assert np.degrees(np.abs(np.diff(track.yaw_rad)[turns])) * RATE_HZ == pytest.approx(45)
+
+
+def test_a_robot_that_keeps_its_heading_has_no_time_to_turn() -> None:
+    with pytest.raises(ValidationError, match="leave turn_deg_s out"):
+        made(kind="waypoints", points_m=[[0, 0], [1, 0]], yaw_deg=0, turn_deg_s=45)
+
+
 @pytest.mark.parametrize("sweep", [90.0, -270.0])
 def test_an_arc_stays_on_its_circle_and_heads_along_it(sweep: float) -> None:
     track = made(kind="arc", center_m=[1, 2], radius_m=1.5, start_deg=30, sweep_deg=sweep, speed_m_s=0.4)

@@ -8,7 +8,7 @@ import pytest
 
 from uwbbench.api import registry, write_capture
 from uwbbench.api.locate import shipped
-from uwbbench.tools.check import Conformance, all_checks, examine, subject_of
+from uwbbench.tools.check import Conformance, checks_of, examine, subject_of
 from uwbbench.tools.check.inputs import usual_capture
 from uwbbench.tools.check.process import digests_elsewhere
 from uwbbench.tools.check.subject import Subject
@@ -16,6 +16,7 @@ from uwbbench.tools.check.subject import Subject
 pytestmark = pytest.mark.slow
 
 STAGES = [("stage", name) for name in registry.entries("stages")]
+MAPPERS = [("mapper", name) for name in registry.entries("mappers")]
 METRICS = [("metric", name) for name in registry.entries("metrics")]
 DETECTORS = [("detector", name) for name in shipped("detectors")]
 SIMULATED = {
@@ -29,7 +30,7 @@ MEASURED = ("pulson440-rail", "pulson440-tree", "et4173-walk", "dw1000-apartment
 @pytest.fixture(scope="module")
 def subjects() -> dict[tuple[str, str], Subject]:
     """All but the datasets of files, with what another process makes of each; one process for all saves a minute."""
-    wanted: list[Subject] = [subject_of(kind, name) for kind, name in STAGES + METRICS + DETECTORS]  # type: ignore[arg-type]
+    wanted: list[Subject] = [subject_of(kind, name) for kind, name in STAGES + MAPPERS + METRICS + DETECTORS]  # type: ignore[arg-type]
     wanted += [subject_of("dataset", name, params) for name, params in SIMULATED.items()]
     for subject, found in zip(wanted, digests_elsewhere(wanted), strict=True):
         subject.digest_elsewhere = found
@@ -38,18 +39,20 @@ def subjects() -> dict[tuple[str, str], Subject]:
 
 def examined(subject: Subject) -> Conformance:
     """All checks but the hard cases, which tests/stability puts to every shipped detector."""
-    return examine(subject, [one.name for one in all_checks(subject.kind) if not one.name.startswith("hard-")])
+    return examine(subject, [one.name for one in checks_of(subject) if not one.name.startswith("hard-")])
 
 
 def failures(found: Conformance) -> Iterator[str]:
     return (f"{one.explain()}\n{one.trace}" for one in found.results if not one.passed)
 
 
-@pytest.mark.parametrize(("kind", "name"), [*STAGES, *METRICS, *DETECTORS, *(("dataset", name) for name in SIMULATED)])
+@pytest.mark.parametrize(
+    ("kind", "name"), [*STAGES, *MAPPERS, *METRICS, *DETECTORS, *(("dataset", name) for name in SIMULATED)]
+)
 def test_it_conforms(subjects, kind, name):
     found = examined(subjects[kind, name])
     assert not list(failures(found)), "\n".join(failures(found))
-    assert found.count("passed") > 18
+    assert found.count("passed") > 13
 
 
 def test_capture_files_conform(tmp_path):

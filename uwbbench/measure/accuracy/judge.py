@@ -27,6 +27,9 @@ Conventions
   :mod:`uwbbench.measure.accuracy.judges.segments`.
 * ``presence``: every frame is judged as a whole, by :mod:`uwbbench.measure.accuracy.judges.presence`; the only scoring
   of rows without a range.
+* ``pose`` and ``map``: a run as a whole is judged, by what a mapper made of it
+  (:mod:`uwbbench.measure.accuracy.judges.pose` and :mod:`uwbbench.measure.accuracy.judges.map`). No other scoring is of
+  a mapper's rows, as they are of several receivers.
 * An error refers to the matched obstacle, else to the nearest visible one, else to the nearest labelled one.
 * Truth that is not exhaustive: a detection that matches nothing is ``unmatched``, neither true nor false, and has no
   error. Frames and obstacles that nothing matches are misses.
@@ -39,10 +42,13 @@ from uwbbench.api.detections import Detections
 from uwbbench.api.errors import ScoringError
 from uwbbench.config.rules import Table
 from uwbbench.measure.accuracy.judges.detections import judge_detections
+from uwbbench.measure.accuracy.judges.map import judge_map
+from uwbbench.measure.accuracy.judges.pose import judge_pose
 from uwbbench.measure.accuracy.judges.presence import judge_presence
+from uwbbench.measure.accuracy.judges.run import check_kind
 from uwbbench.measure.accuracy.judges.segments import judge_segments
 from uwbbench.measure.accuracy.judges.tracks import judge_tracks
-from uwbbench.measure.accuracy.rules import ScoringRules
+from uwbbench.measure.accuracy.rules import ScoringRules, outcome_of
 from uwbbench.measure.accuracy.scene import Scene
 from uwbbench.measure.accuracy.verdict import Verdict
 
@@ -58,21 +64,31 @@ def judge(detections: Detections, scene: Scene, rules: ScoringRules, table: Tabl
         Of the same capture and detections.
     rules : ScoringRules
     table : {"filtering", "mapping"}
-        Errors in range, or in position: of the clustered detections, or of tracks.
+        Errors in range, or in position: of the clustered detections, or of tracks. Poses as they were handed out, or
+        smoothed.
 
     Raises
     ------
     ScoringError
         If ``peak`` is asked for without the peaks before the filters, ``latest`` without the times of hand-out, or
         ``track`` or ``segment`` of detections that no stage made tracks or segments of; or rows lack a range, which
-        ``presence`` alone can do without.
+        ``presence`` alone can do without. If a mapper's detections are to be judged by another scoring than ``pose``
+        and ``map``, or others by these; or poses or map are not finite.
     """
-    if rules.scoring != "presence":
+    of_run = outcome_of(rules.scoring).of_run
+    check_kind(detections, rules.scoring, of_run=of_run)
+    if rules.scoring != "presence" and not of_run:
         _check_ranges(detections)
     return _FAMILIES.get(rules.scoring, judge_detections)(detections, scene, rules, table)
 
 
-_FAMILIES = {"track": judge_tracks, "segment": judge_segments, "presence": judge_presence}
+_FAMILIES = {
+    "track": judge_tracks,
+    "segment": judge_segments,
+    "presence": judge_presence,
+    "pose": judge_pose,
+    "map": judge_map,
+}
 """Judges of the scorings that judge something else than single detections."""
 
 
@@ -88,9 +104,13 @@ def _check_ranges(detections: Detections) -> None:
 def tables_of(detections: Detections, scoring: str) -> tuple[Table, ...]:
     """Tables that detections can be judged by: ``mapping`` where they are clustered, or are tracks with positions.
 
-    Segments and presence have no positions.
+    Segments and presence have no positions. Of poses ``mapping`` is the smoothed trajectory, where there is one; a map
+    has one table.
     """
-    if scoring in ("segment", "presence"):
+    if scoring in ("segment", "presence", "map"):
         return ("filtering",)
+    if scoring == "pose":
+        smoothed = detections.mapped is not None and detections.mapped.smoothed is not None
+        return ("filtering", "mapping") if smoothed else ("filtering",)
     needed = ("x_m", "y_m") if scoring == "track" else ("cluster", "x_m", "y_m")
     return ("filtering", "mapping") if all(column in detections for column in needed) else ("filtering",)

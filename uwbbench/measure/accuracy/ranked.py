@@ -114,7 +114,7 @@ def ranked(detections: Detections, scene: Scene, rules: ScoringRules, asked: str
     RankedCounts or None
         None where the candidates are not known, or none of the columns is there to order them.
     """
-    candidates = detections.candidates
+    candidates = None if detections.mapped is not None else detections.candidates
     order = None if candidates is None else order_of(candidates, asked)
     if candidates is None or order is None:
         return None

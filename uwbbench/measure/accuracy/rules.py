@@ -9,7 +9,7 @@ from typing import Any, get_args
 
 from uwbbench.api.errors import ScoringError, nearest
 from uwbbench.api.metric import Metric, Outcome
-from uwbbench.api.outcomes import PresenceOutcome, SegmentOutcome, TrackOutcome
+from uwbbench.api.outcomes import MapOutcome, PoseOutcome, PresenceOutcome, SegmentOutcome, TrackOutcome
 from uwbbench.config.rules import Scoring, Surface
 from uwbbench.measure.accuracy.region import Region
 
@@ -19,6 +19,8 @@ _OUTCOMES: Mapping[str, type[Outcome]] = {
     "track": TrackOutcome,
     "segment": SegmentOutcome,
     "presence": PresenceOutcome,
+    "pose": PoseOutcome,
+    "map": MapOutcome,
 }
 
 
@@ -28,8 +30,9 @@ def outcome_of(scoring: str) -> type[Outcome]:
 
 
 def applies(metric: type[Metric], scoring: str) -> bool:
-    """Whether a metric has a meaning in a scoring."""
-    return issubclass(outcome_of(scoring), metric.of)
+    """Whether a metric has a meaning in a scoring: where runs are judged, none that counts detections has."""
+    made = outcome_of(scoring)
+    return issubclass(made, metric.of) and made.of_run == metric.of.of_run
 
 
 @dataclass(frozen=True)
@@ -38,7 +41,7 @@ class ScoringRules:
 
     Parameters
     ----------
-    scoring : {"frame", "peak", "object", "latest", "track", "segment", "presence"}
+    scoring : {"frame", "peak", "object", "latest", "track", "segment", "presence", "pose", "map"}
     gate_m : float
         Largest error of a true detection, inclusive.
     region : Region

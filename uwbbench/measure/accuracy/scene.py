@@ -61,9 +61,11 @@ class Scene:
         Raises
         ------
         ScoringError
-            If the capture has no truth, or the detections name frames that it does not have.
+            If the capture has no truth and the detections no poses, or they name frames that it does not have.
         """
         truth, frames = header.truth, len(header)
+        if truth is None and detections.mapped is not None:
+            truth = Truth((), exhaustive=False)  # poses can be judged without
         if truth is None:
             raise ScoringError(f"capture '{header.name}' has no ground truth; it can be detected on, but not scored")
         for index in (detections.frame, detections.processed):

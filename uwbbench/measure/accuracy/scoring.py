@@ -29,6 +29,8 @@ from uwbbench.measure.accuracy.metrics.error import (
     StandardDeviation,
     matched_only,
 )
+from uwbbench.measure.accuracy.metrics.map import MAP_METRICS
+from uwbbench.measure.accuracy.metrics.pose import POSE_METRICS
 from uwbbench.measure.accuracy.metrics.presence import PRESENCE_METRICS, confusion
 from uwbbench.measure.accuracy.metrics.segment import SEGMENT_METRICS
 from uwbbench.measure.accuracy.metrics.track import TRACK_METRICS
@@ -45,6 +47,8 @@ _OWN: Mapping[str, Mapping[str, type[Metric]]] = {
     "track": TRACK_METRICS,
     "segment": SEGMENT_METRICS,
     "presence": PRESENCE_METRICS,
+    "pose": POSE_METRICS,
+    "map": MAP_METRICS,
 }
 """Metrics that one scoring alone has, which its scores hold beside those of every scoring."""
 
@@ -80,6 +84,9 @@ class ScoreBlock:
     own : mapping of str to float
         What this scoring alone has, such as ``gospa_m`` of tracks (:mod:`uwbbench.measure.accuracy.metrics.track`); in
         a program's hands like the others: ``block.gospa_m``.
+    counts : bool
+        Whether detections are counted. Where a run is judged they are not: files then hold ``frames``, ``unprocessed``,
+        ``exhaustive`` and ``own`` alone.
     """
 
     precision: float
@@ -107,6 +114,7 @@ class ScoreBlock:
     unprocessed: int
     exhaustive: bool
     own: Mapping[str, float] = field(default_factory=dict)
+    counts: bool = True
 
     def __getattr__(self, name: str) -> float:
         own = self.__dict__.get("own", {})  # absent while an instance is being unpickled
@@ -117,7 +125,10 @@ class ScoreBlock:
     def to_dict(self) -> dict[str, Any]:
         """Plain values for JSON, None where a number is undefined."""
         values = dataclasses.asdict(self)
-        values |= values.pop("own")
+        own = values.pop("own")
+        if not values.pop("counts"):
+            values = {name: values[name] for name in ("frames", "unprocessed", "exhaustive")}
+        values |= own
         return {k: None if isinstance(v, float) and math.isnan(v) else v for k, v in values.items()}
 
 
@@ -191,7 +202,7 @@ def score(
         With ``range_m``; with ``x_m``, ``y_m`` and ``cluster`` too for the mapping table.
     capture : Capture or CaptureHeader
         Its samples are not touched.
-    scoring : {"frame", "peak", "object", "latest", "track", "segment", "presence"}
+    scoring : {"frame", "peak", "object", "latest", "track", "segment", "presence", "pose", "map"}
     gate_m : float
         Largest error of a true detection, inclusive.
     region : Region, optional
@@ -261,13 +272,15 @@ def outcomes(detections: Detections, header: CaptureHeader, rules: ScoringRules)
 
 
 def column_of(name: str, unit: str) -> str:
-    """Column of a metric: lengths say that they are in metres."""
-    return f"{name}_m" if unit == "m" else name
+    """Column of a metric: lengths say that they are in metres, angles that they are in radians."""
+    return f"{name}_{unit}" if unit in ("m", "rad") else name
 
 
 def _block(detections: Detections, scene: Scene, rules: ScoringRules, table: Table, verdict: Verdict) -> ScoreBlock:
-    everywhere = dataclasses.replace(rules, region=dataclasses.replace(rules.region, min_range_m=0.0))
     judged, matched = [verdict.outcome], [matched_only(verdict.outcome)]
+    of_run = verdict.outcome.of_run
+    everywhere = dataclasses.replace(rules, region=dataclasses.replace(rules.region, min_range_m=0.0))
+    from_zero = verdict if of_run else judge(detections, scene, everywhere, table)
     return ScoreBlock(
         precision=evaluate(Precision, judged),
         recall=evaluate(Recall, judged),
@@ -289,13 +302,14 @@ def _block(detections: Detections, scene: Scene, rules: ScoringRules, table: Tab
         unmatched=verdict.unmatched,
         chance_recall=verdict.chance_recall,
         false_alarms_per_minute=evaluate(FalseAlarmsPerMinute, judged),
-        recall_with_blind_zone=evaluate(Recall, [judge(detections, scene, everywhere, table).outcome]),
+        recall_with_blind_zone=evaluate(Recall, [from_zero.outcome]),
         frames=len(verdict.outcome.group),
-        unprocessed=scene.unprocessed,
+        unprocessed=len(scene.header) - len(verdict.outcome.group) if rules.scoring == "pose" else scene.unprocessed,
         exhaustive=scene.truth.exhaustive,
         own={
             column_of(name, metric.unit): evaluate(metric, judged)
             for name, metric in _OWN.get(rules.scoring, {}).items()
         }
         | (confusion(verdict.outcome) if isinstance(verdict.outcome, PresenceOutcome) else {}),
+        counts=not of_run,
     )

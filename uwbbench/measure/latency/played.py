@@ -44,7 +44,15 @@ class Played(Protocol):
     def __len__(self) -> int: ...
 
     def frames(self, start: int, stop: int, /, *, sts: bool = True) -> Any:
-        """Frames from one to the one before another."""
+        """Frames of all receivers.
+
+        Parameters
+        ----------
+        start, stop : int
+            First frame or step, and the one behind the last.
+        sts : bool
+            With STS responses.
+        """
 
     def blocks(self, size: int, /, *, sts: bool = True) -> Iterator[Any]:
         """Frames in consecutive blocks."""

@@ -10,8 +10,7 @@ from typing import Any
 
 from uwbbench.api.errors import ConfigError, nearest
 from uwbbench.api.text import printable
-from uwbbench.config.detector import marked
-from uwbbench.config.identity import from_results
+from uwbbench.config.identity import from_results, marked
 from uwbbench.measure.accuracy.metrics.choice import MetricChoice, combined
 from uwbbench.results.comparison.causes import CauseChange, cause_changes
 from uwbbench.results.comparison.changes import Change, changes

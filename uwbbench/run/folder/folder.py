@@ -6,6 +6,8 @@
 ``detections/UNIT.parquet``     what a detector found on a capture
 ``candidates/UNIT.parquet``     peaks before the filters, where ``peak`` scoring was asked for
 ``curves/UNIT.parquet``        what it would find at every threshold of its score
+``poses/UNIT.parquet``          poses of a mapper on a run, on the way and smoothed
+``maps/UNIT.npz``               its map, as named arrays
 ``captures/ID.json, .parquet``  a capture without its samples: radar, poses, truth
 ``times/UNIT.parquet``          time of every call of a latency pass
 ``scores.parquet``              one row for each detector, capture, scoring and table
@@ -28,10 +30,11 @@ from uwbbench.api.arrays import FloatArray
 from uwbbench.api.capture import CaptureHeader
 from uwbbench.api.detections import Detections
 from uwbbench.api.errors import StoreError
+from uwbbench.api.mapper import Mapped
 from uwbbench.config.detector import REFERENCE
 from uwbbench.measure.accuracy.ranked import RankedCounts
 from uwbbench.measure.accuracy.scoring import ScoringRules
-from uwbbench.run.folder import journal, tables
+from uwbbench.run.folder import journal, mapped, tables
 from uwbbench.run.folder.files import disk_errors, read_json, read_parquet, write_json, write_parquet, write_text
 from uwbbench.run.folder.identity import digest, plain
 from uwbbench.run.folder.journal import Entry
@@ -131,7 +134,7 @@ class RunFolder:
 
     def result_files(self) -> list[str]:
         """Files that hold results, by their path in the folder; reports are made of these."""
-        folders = ("captures", "detections", "candidates", "curves", "times")
+        folders = ("captures", "detections", "candidates", "poses", "maps", "curves", "times")
         with disk_errors(self.path, "read"):
             files = [path for name in folders for path in (self.path / name).glob("*") if path.is_file()]
             files += [path for name in ("journal.jsonl", "scores.parquet") if (path := self.path / name).is_file()]
@@ -173,9 +176,35 @@ class RunFolder:
             tables.write_detections(self._file("candidates", unit), candidates)
 
     def detections(self, unit: str) -> Detections:
-        """Read what a detector found, with the candidates if they were stored."""
+        """Read what a detector found, with the candidates, and with the poses and the map, if they were stored."""
         candidates = self._file("candidates", unit)
-        return tables.read_detections(self._file("detections", unit), candidates if candidates.is_file() else None)
+        found = tables.read_detections(self._file("detections", unit), candidates if candidates.is_file() else None)
+        poses, map_ = self._file("poses", unit), self._map(unit)
+        if not (poses.is_file() or map_.is_file()):
+            return found
+        on_the_way, smoothed = mapped.read_poses(poses)
+        return found.annotated(mapped=Mapped(on_the_way, mapped.read_map(map_), smoothed))
+
+    def write_mapped(self, unit: str, made: Mapped | None, time_s: FloatArray) -> None:
+        """Store poses and map of a mapper, in place of what an earlier session stored.
+
+        Parameters
+        ----------
+        unit : str
+            Identifier of the unit.
+        made : Mapped or None
+            None of a plain detector.
+        time_s : (steps,) array
+            Of the run.
+        """
+        poses, map_ = self._file("poses", unit), self._map(unit)
+        if made is not None:
+            mapped.write_poses(poses, made, time_s)
+            mapped.write_map(map_, made.map)
+            return
+        for path in (poses, map_):
+            with disk_errors(path, "removed"):
+                path.unlink(missing_ok=True)
 
     def write_curve(self, unit: str, counts: RankedCounts | None, rules: ScoringRules) -> None:
         """Store what a detector would find at every threshold of its score, in place of what an earlier session stored.
@@ -308,6 +337,9 @@ class RunFolder:
         """Write a text file such as ``report.md`` into the folder."""
         write_text(self.path / name, text)
         return self.path / name
+
+    def _map(self, unit: str) -> Path:
+        return self._file("maps", unit).with_suffix(".npz")
 
     def _file(self, kind: str, unit: str) -> Path:
         return self.path / kind / f"{_safe(unit)}.parquet"

@@ -15,6 +15,7 @@ from uwbbench.api.metric import Metric, Outcome
 from uwbbench.config.rules import RegionModel
 from uwbbench.measure.accuracy.causes import Causes, causes
 from uwbbench.measure.accuracy.metrics.choice import MetricChoice, Metrics
+from uwbbench.measure.accuracy.rules import outcome_of
 from uwbbench.measure.accuracy.scene import Scene
 from uwbbench.measure.accuracy.scoring import Region, ScoringRules, column_of, outcomes, score_scene
 from uwbbench.measure.accuracy.stats import evaluate
@@ -98,7 +99,7 @@ def with_causes(
     ----------
     rows : iterable of mapping
         Of :func:`score_rows`; those that are not scored stay as they are, and so do those by the latest answer, whose
-        errors may be those of another frame, or of presence, which has none.
+        errors may be those of another frame, or of presence and whole runs, which have none.
     detections : Detections
         With their candidates; without them the causes of misses are not known.
     scene : Scene
@@ -109,7 +110,8 @@ def with_causes(
     by_name = {rule.scoring: rule for rule in rules}
     completed = [dict(row) for row in rows]
     for row in completed:
-        if row["status"] == "scored" and row["scoring"] not in ("latest", "presence"):
+        counted = row["scoring"] not in ("latest", "presence") and not outcome_of(row["scoring"]).of_run
+        if row["status"] == "scored" and counted:
             row[CAUSES] = canonical(causes(detections, scene, by_name[row["scoring"]], row["table"]).to_dict())
     return completed
 

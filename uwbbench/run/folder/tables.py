@@ -127,7 +127,10 @@ def write_header(stem: Path, header: CaptureHeader, sha256: str) -> None:
     about = {name: getattr(header, name) for name in (*_ABOUT, *_LATER)}
     truth = None if header.truth is None else {"exhaustive": header.truth.exhaustive, "objects": objects}
     write_parquet(stem.with_suffix(".parquet"), pa.table(columns), {})
-    write_json(stem.with_suffix(".json"), {**about, "sha256": sha256, "radar": header.radar.to_dict(), "truth": truth})
+    about |= {"sha256": sha256, "radar": header.radar.to_dict(), "truth": truth}
+    if header.radars:
+        about["radars"] = [radar.to_dict() for radar in header.radars]
+    write_json(stem.with_suffix(".json"), about)
 
 
 def read_header(stem: Path) -> CaptureHeader:
@@ -138,9 +141,6 @@ def read_header(stem: Path) -> CaptureHeader:
     def column(name: str) -> np.ndarray[Any, np.dtype[np.float64]]:
         return np.asarray(table.column(name).to_numpy(), dtype=np.float64)
 
-    radar: dict[str, Any] = {
-        key: tuple(value) if isinstance(value, list) else value for key, value in data["radar"].items()
-    }
     truth = None
     if data["truth"] is not None:
         objects = []
@@ -157,7 +157,14 @@ def read_header(stem: Path) -> CaptureHeader:
     return CaptureHeader(
         **{name: data[name] for name in _ABOUT},
         **{name: data[name] for name in _LATER if name in data},
-        radar=Radar(**radar),
+        radar=_radar(data["radar"]),
         trajectory=Trajectory(column("timestamp_s"), position_m, column("yaw_rad")),
         truth=truth,
+        radars=tuple(_radar(one) for one in data.get("radars", ())),
     )
+
+
+def _radar(stored: Mapping[str, Any]) -> Radar:
+    """Radar as a capture's file has it."""
+    values: dict[str, Any] = {key: tuple(value) if isinstance(value, list) else value for key, value in stored.items()}
+    return Radar(**values)

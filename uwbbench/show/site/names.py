@@ -6,8 +6,7 @@ import re
 from collections import Counter
 from collections.abc import Sequence
 
-from uwbbench.config.detector import marked
-from uwbbench.config.identity import from_results
+from uwbbench.config.identity import from_results, marked
 from uwbbench.results.leaderboard.suites import Contender, Suite
 from uwbbench.run.folder.identity import digest
 from uwbbench.show.text.sheet import labels, shown

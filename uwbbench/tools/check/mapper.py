@@ -183,7 +183,15 @@ def answer_moves_with_the_world(subject: MapperSubject) -> str:
 
 
 def turned(pose: FloatArray, angle: float, shift_m: FloatArray) -> FloatArray:
-    """Poses (n, 3) turned about the origin and shifted."""
+    """Poses (n, 3) turned about the origin and shifted.
+
+    Parameters
+    ----------
+    pose : (n, 3) array
+    angle : float
+        In radians.
+    shift_m : (2,) array
+    """
     cosine, sine = np.cos(angle), np.sin(angle)
     x, y = pose[:, 0], pose[:, 1]
     places = np.column_stack([cosine * x - sine * y, sine * x + cosine * y]) + shift_m

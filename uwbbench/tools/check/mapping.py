@@ -74,7 +74,7 @@ def values_of(found: Detections) -> Values:
 
 def _streamed(subject: MappingSubject, cuts: Sequence[int]) -> Detections:
     """What the detector makes of the usual drive handed over in pieces."""
-    drive, loop = subject.drive, subject.pipeline.open(subject.drive)
+    drive, loop = subject.drive, subject.pipeline.open(subject.drive, keep=True)
     poses = [loop.step(drive.frames(start, stop)) for start, stop in pairwise([0, *cuts, len(drive)])]
     poses.append(loop.flush())
     smoothed, learnt = loop.finish()
@@ -176,7 +176,7 @@ def captures_without_odometry_are_refused(subject: MappingSubject) -> str:
 def runs_share_nothing(subject: MappingSubject) -> None:
     """Two runs by turns give what each alone gives."""
     drive = subject.drive
-    one, other = subject.pipeline.open(drive), subject.pipeline.open(drive)
+    one, other = subject.pipeline.open(drive, keep=True), subject.pipeline.open(drive)
     poses = []
     for start, stop in pairwise([0, *CUTS["blocks of 7"], len(drive)]):
         poses.append(one.step(drive.frames(start, stop)))
