@@ -156,9 +156,7 @@ class Report:
         first = members[0]
         about = {key: getattr(first, key) for key in ("dataset", "source", "scoring", "table", "detector")}
         truths = np.array([one.outcome.tp.sum() + one.outcome.fn.sum() for one in members], float)
-        chance = np.array(
-            [math.nan if (c := one.numbers.get("chance_recall")) is None else c for one in members], float
-        )
+        chance = np.array([one.numbers.get("chance_recall") for one in members], float)  # None becomes NaN
         return about | {
             "captures": len(members),
             "scenes": len(set(scenes_of(members).values())),

@@ -68,7 +68,7 @@ class Ekf:
         Where the run starts; certain, as everything is measured from there.
     motion : MotionParams
     near_m : float
-        Landmarks within this distance of the robot take part in each update at once. Lines always do.
+        Landmarks within this distance of the robot take part in each update at once. Lines and anchors always do.
     reach_m : float
         How far the robot sees: the neighbourhood is left when the robot has moved by ``near_m - reach_m``.
     """
@@ -329,8 +329,8 @@ class Ekf:
         self._center_m = self._mean[:2].copy()
         places = rest.mean[HEAD:].reshape(-1, 2)
         near = np.hypot(*(places - self._center_m).T) <= self._near_m
-        lines = np.array([self._marks[handle].kind == "line" for handle in rest.handles], bool)
-        chosen = near | lines
+        always = np.array([self._marks[handle].kind != "point" for handle in rest.handles], bool)
+        chosen = near | always
         self._set_near([handle for handle, taken in zip(rest.handles, chosen, strict=True) if taken])
         resting = [handle for handle, taken in zip(rest.handles, chosen, strict=True) if not taken]
         columns = places_of(rest.handles, self._near)
