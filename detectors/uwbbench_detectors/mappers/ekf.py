@@ -12,7 +12,7 @@ map-building algorithm for real-time implementation, IEEE T-RA 17(3), 2001).
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import ClassVar, Protocol
 
 import numpy as np
 
@@ -24,7 +24,7 @@ from uwbbench_detectors.mappers.rest import Rest, places_of
 class Model(Protocol):
     """How landmarks of one kind are seen; ``k`` numbers are measured of each."""
 
-    kind: LandmarkKind
+    kind: ClassVar[LandmarkKind]
 
     def expected(self, pose: FloatArray, marks: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """What would be measured of landmarks (m, 2) from a pose (3,).
@@ -129,6 +129,26 @@ class Ekf:
     def doubt(self, covariance: FloatArray) -> None:
         """Add to the covariance (3, 3) of the pose, after something that the motion model does not know."""
         self._covariance[:3, :3] += covariance
+
+    def expected(self, model: Model, handle: int) -> tuple[FloatArray, FloatArray]:
+        """What would be measured of a near landmark now.
+
+        Parameters
+        ----------
+        model : Model
+        handle : int
+
+        Returns
+        -------
+        (k,) array, (k,) array
+            And standard deviations, as far as pose and landmark are not known.
+        """
+        start = self._at(handle)
+        measured, by_pose, by_mark = model.expected(self._mean[:3], self._mean[None, start : start + 2])
+        rows = np.array([0, 1, 2, start, start + 1])
+        by_both = np.concatenate([by_pose[0], by_mark[0]], axis=1)
+        spread = by_both @ self._covariance[np.ix_(rows, rows)] @ by_both.T
+        return measured[0], np.sqrt(np.diag(spread))
 
     def distances(
         self, model: Model, measured: FloatArray, noise: FloatArray, handles: list[int] | None = None
@@ -283,6 +303,8 @@ class Ekf:
         first, second = self._at(one), self._at(other)
         rows = np.array([first, first + 1, second, second + 1])
         difference = self._mean[first : first + 2] - self._mean[second : second + 2]
+        if self._marks[one].kind == "line":
+            difference[1] = wrapped(difference[1])
         return rows, difference, np.hstack([np.eye(2), -np.eye(2)])
 
     def _correct(self, rows: IntArray, seen: FloatArray, off: FloatArray, noise: FloatArray) -> float:
