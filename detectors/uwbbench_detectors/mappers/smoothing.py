@@ -178,7 +178,7 @@ def _motion(gtsam: Any, keys: tuple[int, int, int], moved: FloatArray, by_scales
     return gtsam.CustomFactor(gtsam.noiseModel.Gaussian.Covariance(noise), list(keys), error)
 
 
-def close_loops(problem: Problem, gate: float) -> tuple[Problem, Solution]:
+def close_loops(problem: Problem, gate: float) -> tuple[Solution, IntArray]:
     """Smooth, take landmarks for one that lie within the gate of each other, and smooth again, until none do.
 
     Two landmarks are one if each is the nearest of the other by their squared distance in standard deviations, of the
@@ -192,16 +192,20 @@ def close_loops(problem: Problem, gate: float) -> tuple[Problem, Solution]:
 
     Returns
     -------
-    (Problem, Solution)
+    Solution
         With the landmarks that are left.
+    (k,) int array
+        Which of them each landmark of the problem is.
     """
+    became = np.arange(len(problem.landmarks))
     while True:
         solution = smooth(problem)
-        name = _merged(solution, _together(problem.sightings, len(problem.landmarks)), gate)
+        seen = problem.sightings
+        name = _merged(solution, _together(seen, len(problem.landmarks)), gate)
         kept, number = np.unique(name, return_inverse=True)
         if len(kept) == len(name):
-            return problem, solution
-        seen = problem.sightings
+            return solution, became
+        became = number[became]
         problem = replace(
             problem,
             poses=np.concatenate([problem.poses[:1], solution.poses[1:]]),
