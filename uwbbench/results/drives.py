@@ -219,3 +219,9 @@ def thinned(count: int, most: int) -> IntArray:
         if count
         else np.zeros(0, np.int64)
     )
+
+
+def cells(grid: Grid, *, occupied: bool = False) -> tuple[FloatArray, FloatArray]:
+    """Middles (n, 2) and log-odds (n,) of the cells of which anything is known, or of the occupied ones alone."""
+    rows, columns = np.nonzero(grid.log_odds > 0 if occupied else grid.log_odds)
+    return grid.origin_m + grid.cell_m * (np.column_stack([columns, rows]) + 0.5), grid.log_odds[rows, columns]

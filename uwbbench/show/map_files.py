@@ -22,7 +22,8 @@ from typing import Any
 import numpy as np
 
 from uwbbench.api.arrays import FloatArray
-from uwbbench.api.mapper import LANDMARK_KINDS, Grid, Map
+from uwbbench.api.mapper import LANDMARK_KINDS, Map
+from uwbbench.results.drives import cells
 
 KINDS = ("surface", "point", "anchor", "segment", "cell")
 """Of what a vertex of a PLY file is: a point of a surface, a landmark, an anchor, the end of a segment, a cell."""
@@ -103,9 +104,3 @@ def _rows(found: Map) -> Iterator[dict[str, Any]]:
         middles_m, log_odds = cells(found.grid)
         for (x, y), value in zip(middles_m.tolist(), log_odds.tolist(), strict=True):
             yield {"kind": "cell", "x_m": x, "y_m": y, "log_odds": value}
-
-
-def cells(grid: Grid, *, occupied: bool = False) -> tuple[FloatArray, FloatArray]:
-    """Middles (n, 2) and log-odds (n,) of the cells of which anything is known, or of the occupied ones alone."""
-    rows, columns = np.nonzero(grid.log_odds > 0 if occupied else grid.log_odds)
-    return grid.origin_m + grid.cell_m * (np.column_stack([columns, rows]) + 0.5), grid.log_odds[rows, columns]

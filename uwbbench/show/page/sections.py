@@ -13,6 +13,7 @@ from uwbbench.api.text import counted
 from uwbbench.measure.accuracy.rules import outcome_of
 from uwbbench.results.verdicts import BOUNDS, INTERVALS, RUN_INTERVALS
 from uwbbench.show.page import answer, error_sections, limits_section
+from uwbbench.show.page.drives import drives
 from uwbbench.show.page.limits_section import limits
 from uwbbench.show.page.section import Section
 from uwbbench.show.text.report import Tables
@@ -164,6 +165,7 @@ SECTIONS: tuple[Writer, ...] = (
     error_sections.causes,
     error_sections.curves,
     looks,
+    drives,
     latency,
     paper_later,
     stability,
