@@ -40,9 +40,7 @@ class PointParams(Params):
 class SlamLinesParams(Params):
     """Odometry, walls and points."""
 
-    motion: MotionParams = Field(
-        MotionParams.model_validate({"fastest_rad_s": 100.0}), description="How far odometry is to be believed."
-    )
+    motion: MotionParams = Field(MotionParams.model_validate({}), description="How far odometry is to be believed.")
     walls: WallParams = Field(WallParams.model_validate({}), description="Which echoes are of walls.")
     points: PointParams = Field(PointParams.model_validate({}), description="Which of the others are of points.")
     travel_m: float = Field(0.6, gt=0, description="Way over which echoes are gathered. Windows do not overlap.")
