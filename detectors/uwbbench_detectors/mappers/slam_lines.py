@@ -130,9 +130,8 @@ class SlamLines(Mapper[SlamLinesParams]):
         here = self._stretch.close()
         free = np.ones(len(here), bool)
         self._see_walls(here, free)
-        kept = self._stretch.keep(free)
-        self._see_points(here.take(free & (here.range_m <= self.params.points.farthest_m)))
-        self._begin_walls(kept)
+        self._see_points(here, free)
+        self._begin_walls(self._stretch.keep(free))
         self._join_walls()
         if self._consistency.diverges:
             self.note("the filter diverges: measurements lie farther from what it expects than chance allows")
@@ -219,9 +218,10 @@ class SlamLines(Mapper[SlamLinesParams]):
         apart_m = first[0] - place_m @ normal(first[1]) - second[0] + place_m @ normal(second[1])
         return bool(abs(apart_m) <= self.params.same_m)
 
-    def _see_points(self, echoes: Echoes) -> None:
-        """Observe points: clusters of echoes that no wall explains."""
+    def _see_points(self, here: Echoes, free: BoolArray) -> None:
+        """Observe points: clusters of free echoes (n,); those of a point that is known are not free any more."""
         p = self.params.points
+        echoes = here.take(free & (here.range_m <= p.farthest_m))
         if len(echoes) < p.min_samples:
             return
         from uwbbench_detectors.clusters.incremental import dbscan  # compiled
@@ -238,6 +238,7 @@ class SlamLines(Mapper[SlamLinesParams]):
             best = int(np.argmin(squared)) if handles else -1
             if handles and squared[best] <= p.gate:
                 self._consistency.add(self._ekf.update(self._point, handles[best], measured, noise), 2)
+                free &= self.params.walls.reach.squared(*here.off_point(place_m)) > 1
             elif not handles or squared[best] > p.begin:
                 self._ekf.add(self._point, measured, noise)
 
