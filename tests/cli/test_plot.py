@@ -20,7 +20,7 @@ def run(ran):
     return ran("tiny", TINY_RUN) / "tiny"
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", [kind for kind in KINDS if kind != "trajectory"])
 def test_each_kind_is_drawn_from_a_capture(uwbbench, capture, kind, tmp_path):
     result = uwbbench("plot", kind, capture, "--detector", "paper", "-o", "made.png")
     assert result.stderr == f"{kind} written to made.png\n"
@@ -50,7 +50,9 @@ def test_without_a_name_the_picture_is_called_after_source_and_kind(uwbbench, ca
         (["cir", "run.h5", "-d", "paper", "--frame", "999"], "has frames 0 to"),
         (["map", "run.h5", "-d", "paper", "--frame", "3"], "--frame is for the kind cir"),
         (["map", "run.h5", "-d", "paper", "--gate-m", "1"], "--gate-m is for the kind cdf and properties"),
-        (["cdf", "run.h5", "-d", "paper", "--table", "map"], "no table 'map'"),
+        (["cdf", "run.h5", "-d", "paper", "--table", "map"], "'map' is not one of 'filtering', 'mapping'"),
+        (["trajectory", "run.h5", "-d", "paper"], "shows what a mapper made of a run: plot it from a run folder"),
+        (["cdf", "run.h5", "-d", "paper", "--aligned"], "--aligned is for the kind trajectory and map"),
         (["cdf", "run.h5", "-d", "paper", "--gate-m", "-1"], "gate_m must be positive"),
         (["cdf", "run.h5", "-d", "paper", "-o", "x.jpg"], "expected .png or .svg or .pdf"),
         (["cdf", "run.h5", "-d", "paper", "--capture", "a"], "--capture chooses from a run folder"),

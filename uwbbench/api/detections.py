@@ -49,6 +49,9 @@ HANDED_OUT = "handed_out"
 
 _INTEGER = ("frame", "cluster", "track", HANDED_OUT)
 
+RECEIVER = "receiver"
+"""Column of the rows of a run: place of the receiver among those of the run."""
+
 _Table = tuple[Sequence[str], FloatArray]
 """Names of columns, and the frames and these columns as one array."""
 

@@ -18,6 +18,7 @@ from uwbbench.api.errors import UwbbenchError
 from uwbbench.cli import (
     data,
     evaluate,
+    export,
     fit,
     gate,
     inspection,
@@ -101,6 +102,7 @@ for _group in (
     stability,
     scaffold,
     plot,
+    export,
     warmup,
     leaderboard,
     suite,

@@ -67,7 +67,7 @@ def _scores(comparison: Comparison) -> None:
                 number(change.after, by.digits, by.factor),
                 interval(d.value, d.low, d.high, by.digits, by.factor),
                 number(change.adjusted, 3),
-                f"{counted(change.captures, 'capture')}, {counted(d.groups, 'scene')}",
+                f"{counted(change.captures, 'capture')}, {counted(d.groups, by.evidence)}",
             )
         )
     if rows:

@@ -32,6 +32,13 @@ class Surface(StrEnum):
     VISIBLE = "visible"
 
 
+class Table(StrEnum):
+    """Which errors, or which poses."""
+
+    FILTERING = "filtering"
+    MAPPING = "mapping"
+
+
 CaptureFile = Annotated[Path, typer.Argument(metavar="CAPTURE", help="Capture file (.h5).", show_default=False)]
 Detector = Annotated[
     str, typer.Option("--detector", "-d", metavar="NAME|FILE", help="Detector by name, or a YAML file.")

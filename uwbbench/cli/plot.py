@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from uwbbench.show.figures.draw import Choices
 
-KINDS_HELP = "Kind: cir, radargram, properties, pipeline, cdf or map."
+KINDS_HELP = "Kind: cir, radargram, properties, pipeline, cdf, map or trajectory."
 
 
 def plot(
@@ -39,7 +39,13 @@ def plot(
     gate_m: Annotated[
         float | None, typer.Option(metavar="METRES", help="Largest error of a true detection, for cdf and properties.")
     ] = None,
-    table: Annotated[str | None, typer.Option(metavar="filtering|mapping", help="Which errors, for cdf.")] = None,
+    table: Annotated[
+        options.Table | None, typer.Option(help="Which errors, for cdf; or which poses of a mapper, for the others.")
+    ] = None,
+    aligned: Annotated[
+        bool | None,
+        typer.Option("--aligned", help="Lay poses and map over the truth as fits best, not by their start."),
+    ] = None,
     settings: options.Settings = None,
 ) -> None:
     """Draw a picture for print. A capture is drawn with a detector that runs on it; from a run folder nothing is run.
@@ -47,13 +53,15 @@ def plot(
     cir: one frame with first path, noise floor, and peaks with prominence, width and fate. radargram: time and range,
     with truth and detections. properties: peak prominence and width against distance, by material. pipeline: from all
     peaks through the filters to clusters, from above. cdf: distribution of the absolute errors. map: clustered points,
-    true outlines and robot path.
+    or what a mapper has mapped, with true outlines and robot path. trajectory: paths of mappers, and errors over time.
     """
     from uwbbench.run.folder import RunFolder
     from uwbbench.show.figures import style
     from uwbbench.show.figures.draw import Choices, check_kind, draw_run
 
-    choices = Choices(frame, None if scoring is None else scoring.value, gate_m, table)
+    choices = Choices(
+        frame, None if scoring is None else scoring.value, gate_m, None if table is None else table.value, aligned
+    )
     check_kind(kind, choices)
     target = output or Path(f"{source.resolve().stem}-{kind}.png")
     options.format_of(target, ".png", ".svg", ".pdf")

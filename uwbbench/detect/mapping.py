@@ -21,7 +21,7 @@ from uwbbench.api import registry
 from uwbbench.api.anchors import Messages
 from uwbbench.api.arrays import IntArray
 from uwbbench.api.capture import Capture
-from uwbbench.api.detections import Detections
+from uwbbench.api.detections import RECEIVER, Detections
 from uwbbench.api.drive import Drive
 from uwbbench.api.errors import CaptureError, ConfigError
 from uwbbench.api.frames import BATCH_FRAMES, Frames
@@ -32,9 +32,6 @@ from uwbbench.config.detector import DetectorConfig, read_detector
 from uwbbench.detect.hand_out import with_hand_outs
 from uwbbench.detect.pipeline import Pipeline
 from uwbbench.detect.stream import Stream
-
-RECEIVER = "receiver"
-"""Column of the rows of a run: place of the receiver among those of the run."""
 
 
 def without_truth(frames: Frames) -> Frames:

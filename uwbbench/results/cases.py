@@ -5,6 +5,7 @@ Conventions
 * The detector that leads the dataset's first leaderboard decides: its best and its worst capture by the metric that
   ranks. Equal ones: the first by name.
 * A detection is *near* if it lies within the gate of a visible obstacle.
+* Runs that are judged as a whole have none.
 * Long captures are thinned to what a picture can show; the counts are those of all frames and detections.
 """
 
@@ -21,7 +22,7 @@ from uwbbench.api.arrays import BoolArray, FloatArray, IntArray
 from uwbbench.api.capture import CaptureHeader
 from uwbbench.api.detections import Detections
 from uwbbench.measure.accuracy.metrics.choice import MetricChoice
-from uwbbench.measure.accuracy.rules import rules_on
+from uwbbench.measure.accuracy.rules import outcome_of, rules_on
 from uwbbench.measure.accuracy.scene import Scene
 from uwbbench.measure.accuracy.scoring import ScoringRules
 from uwbbench.measure.accuracy.stats import evaluate
@@ -123,6 +124,8 @@ def cases(
     """
     for (dataset, source), leader in list(leaders.items())[:MOST_DATASETS]:
         rule = rules_on(folder.rules, dataset)[0]
+        if outcome_of(rule.scoring).of_run:  # a picture of it is a map
+            continue
         chosen = [
             one
             for one in scored
@@ -155,6 +158,8 @@ def _case(folder: RunFolder, entries: Sequence[Entry], rule: ScoringRules, score
     marks = []
     for entry in entries:
         detections = folder.detections(entry.unit)
+        if detections.mapped is not None:  # its rows are of several receivers
+            continue
         scene = Scene.of(detections, header)
         marks.append(_marks(entry.detector, detections, since_s, scene, rule))
     return Case(

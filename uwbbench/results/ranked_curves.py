@@ -21,7 +21,7 @@ import numpy as np
 
 from uwbbench.api.arrays import FloatArray, IntArray
 from uwbbench.measure.accuracy import intervals
-from uwbbench.measure.accuracy.intervals import Interval
+from uwbbench.measure.accuracy.intervals import INNER_UNITS, Interval
 from uwbbench.measure.accuracy.ranked import RankedCounts, pooled, without_each
 from uwbbench.measure.accuracy.rules import rules_on
 from uwbbench.run.folder.folder import RunFolder
@@ -139,7 +139,7 @@ def ranked_curve(parts: Sequence[tuple[RankedCounts, Hashable]], confidence: flo
         whole.average_precision,
         left or [math.nan],
         there if left else [0.0],
-        units=len(scenes),
+        enough=len(scenes) >= INNER_UNITS,
         scale="logit",
         confidence=confidence,
     )

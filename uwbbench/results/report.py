@@ -156,7 +156,7 @@ class Report:
         first = members[0]
         about = {key: getattr(first, key) for key in ("dataset", "source", "scoring", "table", "detector")}
         truths = np.array([one.outcome.tp.sum() + one.outcome.fn.sum() for one in members], float)
-        chance = np.array([math.nan if (c := one.numbers["chance_recall"]) is None else c for one in members], float)
+        chance = np.array([one.numbers.get("chance_recall") for one in members], float)  # None becomes NaN
         return about | {
             "captures": len(members),
             "scenes": len(set(scenes_of(members).values())),
@@ -239,7 +239,7 @@ class Report:
         import pandas as pd
 
         groups: dict[tuple[Any, ...], list[Scored]] = defaultdict(list)
-        for one in self.scored:
+        for one in (one for one in self.scored if not one.outcome.of_run):
             order = one.table, one.scoring, self.detectors.index(one.detector), one.dataset, one.channel or 0
             groups[*order, one.material, one.source].append(one)
         rows = []

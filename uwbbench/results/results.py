@@ -40,7 +40,7 @@ class Scored:
         The stored score row.
     outcome : Outcome
     range_m : (scored frames,) array
-        True range of the nearest visible obstacle; NaN where there is none.
+        True range of the nearest visible obstacle; NaN where there is none, and where a run is judged as a whole.
     scene : str
         Scene or set-up that the capture is of, as captures of one scene repeat one another; empty: one of its own.
     """
@@ -114,8 +114,8 @@ def _scored(folder: RunFolder, rows: Mapping[Any, Any], rules: Sequence[ScoringR
                     processed=len(detections.processed),
                     numbers=rows[key],
                     outcome=outcome,
-                    range_m=_nearest_m(scene, rule),
-                    scene=folder.scene(entry.dataset, entry.capture),
+                    range_m=np.full(len(outcome.group), np.nan) if outcome.of_run else _nearest_m(scene, rule),
+                    scene="" if outcome.of_run else folder.scene(entry.dataset, entry.capture),
                 )
 
 

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 from uwbbench.measure.accuracy.judge import judge
 from uwbbench.measure.accuracy.metrics.detection import FalseAlarmsPerMinute, Precision
+from uwbbench.measure.accuracy.rules import outcome_of
 from uwbbench.measure.accuracy.scene import Scene
 from uwbbench.measure.accuracy.scoring import ScoringRules
 from uwbbench.measure.accuracy.stats import evaluate
@@ -68,7 +69,9 @@ def set_aside(folder: RunFolder, entries: Sequence[Entry], scored: Sequence[Scor
         What was scored of them.
     """
     few: dict[str, ScoringRules] = {
-        rule.scoring: rule for rule in folder.rules if rule.scoring == "frame" or rule.strongest is not None
+        rule.scoring: rule
+        for rule in folder.rules
+        if (rule.scoring == "frame" or rule.strongest is not None) and not outcome_of(rule.scoring).of_run
     }
     units = {(entry.detector, entry.dataset, entry.capture): entry for entry in entries}
     boards: dict[tuple[str, str, str, str], list[Scored]] = defaultdict(list)

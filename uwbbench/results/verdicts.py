@@ -25,8 +25,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from uwbbench.api.text import counted
-from uwbbench.measure.accuracy.boards import RANKED_UNITS, Verdict, holm, rank_sets, verdict
-from uwbbench.measure.accuracy.evidence import WITHIN_SCENES
+from uwbbench.measure.accuracy.boards import Verdict, holm, rank_sets, verdict
+from uwbbench.measure.accuracy.evidence import LEAST_RUNS, WITHIN_SCENES, least_units, unit_of
 from uwbbench.measure.accuracy.intervals import CONFIDENCE, INNER_UNITS
 from uwbbench.measure.accuracy.metrics.choice import MetricChoice
 from uwbbench.measure.accuracy.stats import Difference, Estimate, paired_board, paired_difference
@@ -51,6 +51,15 @@ INTERVALS = (
 )
 """What intervals are, for the reader of a table."""
 
+RUN_INTERVALS = (
+    f"Evidence is counted in runs, each of which is one number: from {LEAST_RUNS} runs on, the interval is Student's, "
+    "for runs that are drawn like these; below there is none."
+)
+"""The same where runs are judged as a whole."""
+
+
+_ENOUGH = {"scene": "six", "run": "ten"}
+"""How many of each rank."""
 
 BOUNDS = (
     "bound: no detector, but what detectors are to be read against, as it reads the truth or does not look at all; it "
@@ -112,6 +121,8 @@ class Ranks:
     pairs : tuple of Pair
     bounds : frozenset of str
         Keys of those that only bound what detectors can reach.
+    unit : {"scene", "run"}
+        What is counted as one piece of evidence.
     """
 
     main: str
@@ -121,6 +132,7 @@ class Ranks:
     sets: Mapping[str, tuple[int, int]]
     pairs: tuple[Pair, ...]
     bounds: frozenset[str] = frozenset()
+    unit: str = "scene"
 
     @property
     def top(self) -> list[str]:
@@ -174,7 +186,7 @@ class Ranks:
         if len(self.order) - len(self.bounds) <= 1:
             return f"{first} has {figures}"
         if not self.sets:
-            return f"{text}, but {counted(self.scenes, 'scene')} cannot rank (six can)"
+            return f"{text}, but {counted(self.scenes, self.unit)} cannot rank ({_ENOUGH[self.unit]} can)"
         others = [names[key] for key in self.top if key != self.order[0]]
         if self.order[0] not in self.top or not others:
             return text
@@ -246,7 +258,7 @@ def ranks_of(
             ahead[place[pair.better], place[worse]] = True
     count = len(set(scenes.values()))
     sets = {}
-    if count >= RANKED_UNITS:
+    if count >= least_units(metrics[main]):
         sets = {key: (low, high) for key, (low, high) in zip(complete, rank_sets(ahead).tolist(), strict=True)}
     names = [main, *metrics.error(exhaustive=exhaustive)]
 
@@ -256,7 +268,8 @@ def ranks_of(
         return (key in bounds, key not in place, *costs, times.get(key, math.inf))
 
     known = frozenset(key for key in members if key in bounds)
-    return Ranks(main, len(captures), count, tuple(sorted(members, key=order)), sets, pairs, known)
+    in_order = tuple(sorted(members, key=order))
+    return Ranks(main, len(captures), count, in_order, sets, pairs, known, unit_of(metrics[main]))
 
 
 def pairs_of(
@@ -295,9 +308,10 @@ def pairs_of(
                 one, other = ([outcomes[key][capture] for capture in shared] for key in (first, second))
                 difference = paired_difference(metric, one, other, [scenes[capture] for capture in shared])
                 differences[first, second] = len(shared), difference
-        tested = [d.p_value if d.groups >= RANKED_UNITS else math.nan for _, d in differences.values()]
+        least = least_units(metric)
+        tested = [d.p_value if d.groups >= least else math.nan for _, d in differences.values()]
         for ((first, second), (count, d)), p_value in zip(differences.items(), holm(tested).tolist(), strict=True):
-            word = verdict(d.contrast, p_value, d.groups, metric.margin)
+            word = verdict(d.contrast, p_value, d.groups, metric.margin, least)
             better = None
             if word == "differs" and metric.better != "zero":
                 better = first if metric.merit(d.value) > 0 else second

@@ -12,6 +12,7 @@ from uwbbench.api.capture import Capture
 from uwbbench.api.dataset import Dataset
 from uwbbench.api.errors import ConfigError
 from uwbbench.config.given import Given
+from uwbbench.config.rules import Table
 from uwbbench.config.source import data_roots
 from uwbbench.config.source import open_dataset as opened_dataset
 from uwbbench.detect.pipeline import Pipeline, load_detector
@@ -297,7 +298,7 @@ def plot(
     frame: int | None = None,
     scoring: str | None = None,
     gate_m: float | None = None,
-    table: str | None = None,
+    table: Table | None = None,
 ) -> Path:
     """Draw a picture for print, as the command ``plot`` does; simulated captures are labelled so.
 

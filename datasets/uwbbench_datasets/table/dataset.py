@@ -138,13 +138,29 @@ class Table(Dataset[TableParams]):
         CaptureError
             If no file is found.
         """
-        names: list[str] = []
+        return list(self._runs)
+
+    def runs(self) -> dict[str, tuple[str, ...]]:
+        """The receivers of each run of each file; each channel is a run of its own."""
+        runs: dict[str, tuple[str, ...]] = {}
+        for name, run in self._runs.items():
+            runs[run] = (*runs.get(run, ()), name)
+        return runs
+
+    @cached_property
+    def _runs(self) -> dict[str, str]:
+        """Run of each capture."""
+        runs: dict[str, str] = {}
+        by_channel = self._mapping.channel_column is not None
         for stem, path in self._files.items():
             try:
-                names += self._parts(stem, path)
+                parts = self._parts(stem, path)
             except CaptureError:
-                names.append(stem)  # opening it raises the error
-        return names
+                runs[stem] = stem  # opening it raises the error
+                continue
+            for name, part in parts.items():
+                runs[name] = f"{part.recording}/ch{part.channel}" if by_channel else part.recording
+        return runs
 
     def open(self, name: str) -> Capture:
         """Read one capture.

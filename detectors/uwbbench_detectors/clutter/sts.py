@@ -39,8 +39,8 @@ class StsClutter(Stage[StsClutterParams]):
         super().open(radar)
         self._skips = radar.first_tap_delay_s is not None
         self._turn: FloatArray = 2 * np.pi * np.asarray(np.fft.fftfreq(radar.taps), dtype=np.float64)
-        align = AlignParams(to_tap=self.params.to_tap)
-        clutter = ExponentialClutterParams(memory=self.params.memory)
+        align = AlignParams.model_validate({"to_tap": self.params.to_tap})
+        clutter = ExponentialClutterParams.model_validate({"memory": self.params.memory})
         self._antennas = [(Align(align), ExponentialClutter(clutter)) for _ in range(2)]
         for stages in self._antennas:
             for stage in stages:

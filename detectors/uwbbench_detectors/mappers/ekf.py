@@ -12,7 +12,7 @@ map-building algorithm for real-time implementation, IEEE T-RA 17(3), 2001).
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar, Protocol
+from typing import Protocol
 
 import numpy as np
 
@@ -24,7 +24,9 @@ from uwbbench_detectors.mappers.rest import Rest, places_of
 class Model(Protocol):
     """How landmarks of one kind are seen; ``k`` numbers are measured of each."""
 
-    kind: ClassVar[LandmarkKind]
+    @property
+    def kind(self) -> LandmarkKind:
+        """Which kind."""
 
     def expected(self, pose: FloatArray, marks: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """What would be measured of landmarks (m, 2) from a pose (3,).
@@ -68,7 +70,7 @@ class Ekf:
         Where the run starts; certain, as everything is measured from there.
     motion : MotionParams
     near_m : float
-        Landmarks within this distance of the robot take part in each update at once. Lines always do.
+        Landmarks within this distance of the robot take part in each update at once. Lines and anchors always do.
     reach_m : float
         How far the robot sees: the neighbourhood is left when the robot has moved by ``near_m - reach_m``.
     """
@@ -183,7 +185,9 @@ class Ekf:
         weighed = np.linalg.solve(spread, off[:, :, None])[:, :, 0]
         return handles, np.asarray((weighed * off).sum(axis=1))
 
-    def update(self, model: Model, handle: int, measured: FloatArray, noise: FloatArray) -> float:
+    def update(
+        self, model: Model, handle: int, measured: FloatArray, noise: FloatArray, *, trusted: bool = True
+    ) -> float:
         """Take in a measurement of a landmark that is known to be this one.
 
         Parameters
@@ -192,6 +196,9 @@ class Ekf:
         handle : int
         measured : (k,) array
         noise : (k, k) array
+        trusted : bool
+            Whether the measurement may move the robot and the other landmarks. If not, the landmark alone learns from
+            it, and the covariance says so (Schmidt, Advances in Control Systems 3, 1966).
 
         Returns
         -------
@@ -203,9 +210,9 @@ class Ekf:
         expected, by_pose, by_mark = model.expected(self._mean[:3], self._mean[None, start : start + 2])
         off = model.differences(measured, expected)[0]
         self._marks[handle].support += 1
-        return self._correct(
-            np.array([0, 1, 2, start, start + 1]), np.concatenate([by_pose[0], by_mark[0]], axis=1), off, noise
-        )
+        rows = np.array([0, 1, 2, start, start + 1])
+        learning = None if trusted else rows[3:]
+        return self._correct(rows, np.concatenate([by_pose[0], by_mark[0]], axis=1), off, noise, learning)
 
     def add(self, model: Model, measured: FloatArray, noise: FloatArray, number: int | None = None) -> int:
         """Begin a landmark where a measurement places it.
@@ -241,14 +248,16 @@ class Ekf:
         return handle
 
     def remove(self, handle: int) -> None:
-        """Forget a landmark that is near, but not what it has said of the others."""
+        """Forget a landmark, but not what it has said of the others."""
+        del self._marks[handle]
+        if handle not in self._starts:
+            return  # it rests, and goes when the others are brought up to date
         start = self._at(handle)
         rows = [start, start + 1]
         self._mean = np.delete(self._mean, rows)
         self._covariance = np.delete(np.delete(self._covariance, rows, axis=0), rows, axis=1)
         self._rest.remove(rows)
         self._set_near([other for other in self._near if other != handle])
-        del self._marks[handle]
 
     def apart(self, one: int, other: int) -> float:
         """Squared Mahalanobis distance of two near landmarks of one kind from being at one place."""
@@ -271,10 +280,10 @@ class Ekf:
         self._marks[kept].support += self._marks[dropped].support
         self.remove(dropped)
 
-    def landmarks(self, least_support: int = 1) -> Landmarks:
-        """All landmarks with at least so much support, by their handles."""
+    def landmarks(self, handles: list[int] | None = None) -> Landmarks:
+        """Some landmarks by their handles, near or far, or all of them."""
         self._settle()
-        kept = sorted(handle for handle, mark in self._marks.items() if mark.support >= least_support)
+        kept = sorted(self._marks if handles is None else handles)
         if not kept:
             return Landmarks.none()
         marks = [self._marks[handle] for handle in kept]
@@ -307,7 +316,9 @@ class Ekf:
             difference[1] = wrapped(difference[1])
         return rows, difference, np.hstack([np.eye(2), -np.eye(2)])
 
-    def _correct(self, rows: IntArray, seen: FloatArray, off: FloatArray, noise: FloatArray) -> float:
+    def _correct(
+        self, rows: IntArray, seen: FloatArray, off: FloatArray, noise: FloatArray, learning: IntArray | None = None
+    ) -> float:
         """Update with what depends on a few values of the near state alone.
 
         The covariance is that of Joseph's form, ``(I - K H) P (I - K H)' + K R K'``, multiplied out so that the zeros
@@ -323,6 +334,8 @@ class Ekf:
             Innovation.
         noise : (k, k) array
             Covariance R.
+        learning : (l,) int array, optional
+            Places of the near state that are corrected; everything if left out.
 
         Returns
         -------
@@ -333,11 +346,15 @@ class Ekf:
         spread = seen @ across[rows] + noise
         weight = np.asarray(np.linalg.inv(spread), np.float64)
         gain = across @ weight
+        if learning is not None:
+            held = np.ones(len(gain), bool)
+            held[learning] = False
+            gain[held] = 0.0
         self._mean += gain @ off
         self._mean[2] = wrapped(self._mean[2])
         half = gain @ across.T - gain @ (spread / 2) @ gain.T
         self._covariance -= half + half.T
-        self._rest.correct(seen, weight, off, gain, rows)
+        self._rest.correct(seen, weight if learning is None else None, off, gain, rows)
         return float(off @ weight @ off)
 
     def _settle(self) -> None:
@@ -351,8 +368,8 @@ class Ekf:
         self._center_m = self._mean[:2].copy()
         places = rest.mean[HEAD:].reshape(-1, 2)
         near = np.hypot(*(places - self._center_m).T) <= self._near_m
-        lines = np.array([self._marks[handle].kind == "line" for handle in rest.handles], bool)
-        chosen = near | lines
+        always = np.array([self._marks[handle].kind != "point" for handle in rest.handles], bool)
+        chosen = near | always
         self._set_near([handle for handle, taken in zip(rest.handles, chosen, strict=True) if taken])
         resting = [handle for handle, taken in zip(rest.handles, chosen, strict=True) if not taken]
         columns = places_of(rest.handles, self._near)

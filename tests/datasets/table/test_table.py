@@ -114,6 +114,24 @@ def test_receivers_in_a_column_become_captures_with_their_own_mounts(tmp_path, o
         opened(tmp_path, mapping, files=["run.csv"]).open("run/2")
 
 
+def test_receivers_of_one_run_and_channel_are_a_run_that_opens_as_a_drive(tmp_path, original):
+    table = pd.DataFrame(scalars(original) | numbered(separate(responses(original))))
+    parts = [table.assign(r=run, rx=rx, ch=ch) for run in "ab" for rx in ("f", "s") for ch in (5, 9)]
+    pd.concat(parts).to_csv(tmp_path / "log.csv", index=False)
+    columns = {"run_column": "r", "receiver_column": "rx", "channel_column": "ch"}
+    mapping = mapping_of(original, lambda n: {"i": f"{n}_i_{{tap}}", "q": f"{n}_q_{{tap}}"}, **columns)
+    mapping |= {"odometry": mapping["pose"], "receivers": dict.fromkeys("fs", mapping["receivers"]["front"])}
+    del mapping["radar"]["channel"]
+    dataset = opened(tmp_path, mapping, files=["log.csv"])
+    runs = dataset.runs()
+    assert list(runs) == ["log/a/ch5", "log/a/ch9", "log/b/ch5", "log/b/ch9"]
+    assert runs["log/b/ch9"] == ("log/b/f/ch9", "log/b/s/ch9")
+    assert {name for captures in runs.values() for name in captures} == set(dataset.names())
+    drive = dataset.open_run("log/b/ch9", runs["log/b/ch9"])
+    assert list(drive.radars) == ["f", "s"]
+    assert drive.odometry[:, :2] == pytest.approx(original.trajectory.position_m[:, :2])
+
+
 def test_cells_of_matlab_text_split_runs(tmp_path, original):
     runs = np.array(["a"] * 10 + ["b"] * (FRAMES - 10), dtype=object)
     scipy.io.savemat(tmp_path / "run.mat", scalars(original) | responses(original) | {"run": runs})

@@ -66,7 +66,7 @@ def test_values_without_one_unit_are_those_of_the_others(seed, units):
 @given(SEEDS, st.integers(INNER_UNITS, 40))
 def test_a_plain_mean_of_equal_units_has_the_interval_of_student(seed, units):
     values, ones = np.random.default_rng(seed).normal(size=units), np.ones(units)
-    found = of_left_out(values.mean(), delete_one(values, ones), ones, units=units)
+    found = of_left_out(values.mean(), delete_one(values, ones), ones, enough=units >= INNER_UNITS)
     expected = scipy.stats.ttest_1samp(values, 0).confidence_interval(0.95)
     assert (found.low, found.high) == pytest.approx((expected.low, expected.high))
 
@@ -214,8 +214,8 @@ def test_short_blocks_are_trusted_less():
 
 def test_a_number_without_a_form_of_its_own_needs_twelve_units_too():
     num, den = np.random.default_rng(7).normal(1, 0.2, 20), np.ones(20)
-    assert np.isfinite(of_left_out(num.mean(), delete_one(num, den), den, units=12).low)
-    assert np.isnan(of_left_out(num.mean(), delete_one(num, den), den, units=11).low)
+    assert np.isfinite(of_left_out(num.mean(), delete_one(num, den), den, enough=True).low)
+    assert np.isnan(of_left_out(num.mean(), delete_one(num, den), den, enough=False).low)
 
 
 def test_a_single_unit_that_carries_a_number_leaves_it_without_a_standard_error():

@@ -1,10 +1,12 @@
 """Frames as a radio hands them over."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
-from uwbbench.api import Capture, open_capture, write_capture
+from uwbbench.api import Anchors, Capture, Messages, open_capture, write_capture
 from uwbbench.detect.pipeline import load_detector
 from uwbbench.measure.latency.received import laps, received
 
@@ -37,6 +39,16 @@ def test_laps_go_on_as_one_recording(approach: Capture) -> None:
     assert times_s[7] - times_s[6] == pytest.approx(1 / approach.radar.frame_rate_hz)
     assert_array_equal(frames[17].preamble, approach.frames(3, 4).preamble)
     assert_array_equal(frames[17].sts1, approach.frames(3, 4).sts1)
+
+
+def test_messages_of_anchors_stay_with_their_frames_lap_by_lap(approach: Capture) -> None:
+    none = np.full(3, np.nan)
+    said = Messages(np.array([1, 1, 1]), none, np.array([2.0, 3.0, 4.0]), np.zeros(3, bool))
+    anchors = Anchors(np.array([1]), np.zeros((1, 2)), np.array([2, 4, 90]), said)
+    source, _ = laps(received(replace(approach, anchors=anchors), 7), 16)
+    assert source.anchors is not None
+    assert source.anchors.frame.tolist() == [2, 4, 9, 11]
+    assert source.anchors.messages.range_m.tolist() == [2.0, 3.0, 2.0, 3.0]
 
 
 def test_a_detector_that_looks_up_the_truth_gets_the_old_numbers_again(approach: Capture) -> None:

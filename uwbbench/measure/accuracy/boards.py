@@ -174,7 +174,7 @@ def rank_sets(ahead: BoolArray) -> IntArray:
     return np.stack([1 + ahead.sum(axis=0), len(ahead) - ahead.sum(axis=1)], axis=1)
 
 
-def verdict(found: Contrast, adjusted_p: float, units: int, margin: float) -> Verdict:
+def verdict(found: Contrast, adjusted_p: float, units: int, margin: float, least: int = RANKED_UNITS) -> Verdict:
     """What a single difference says, in one word or two.
 
     Parameters
@@ -187,13 +187,15 @@ def verdict(found: Contrast, adjusted_p: float, units: int, margin: float) -> Ve
         Scenes behind it.
     margin : float
         Difference that does not matter.
+    least : int
+        Fewer units than this decide nothing.
 
     Returns
     -------
     {"differs", "equal", "not told apart", "too few", "undefined"}
         A difference that is certain but smaller than the margin is "equal".
     """
-    if units < RANKED_UNITS:
+    if units < least:
         return "too few"
     if np.isnan(found.value) or np.isnan(found.error):
         return "undefined"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Hashable, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,17 +11,31 @@ import numpy as np
 from uwbbench.api.arrays import FloatArray
 from uwbbench.api.metric import Metric, Outcome
 from uwbbench.measure.accuracy import intervals
+from uwbbench.measure.accuracy.boards import RANKED_UNITS
 from uwbbench.measure.accuracy.groups import BLOCKS, blocks_of
-from uwbbench.measure.accuracy.intervals import Blocks, Interval
+from uwbbench.measure.accuracy.intervals import INNER_UNITS, Blocks, Interval
 
 WITHIN_SCENES = 3
 """Up to so many scenes, the interval is that of blocks of their captures."""
+
+LEAST_RUNS = 10
+"""Fewer runs have no interval, and rank nobody, where each run is one piece of evidence."""
 
 SHORTEST_S = 30.0
 """Captures that last less together are not cut into blocks, as these would be too much alike."""
 
 LEFT_OUT_PARTS = 40
 """A metric without a form of its own is evaluated anew without each of at most so many parts of the scenes."""
+
+
+def least_units(metric: type[Metric]) -> int:
+    """Fewest units of evidence, scenes or runs, that rank detectors by a metric."""
+    return LEAST_RUNS if metric.of.of_run else RANKED_UNITS
+
+
+def unit_of(metric: type[Metric]) -> str:
+    """What people call one piece of evidence of a metric."""
+    return "run" if metric.of.of_run else "scene"
 
 
 def merge(metric: type[Metric], partials: Sequence[FloatArray]) -> FloatArray:
@@ -58,10 +72,10 @@ class Evidence:
         series : sequence of sequences of Outcome
             One for each detector, and in it one for each capture, the captures in the same order.
         scenes : sequence
-            What each capture is of; empty: each is of a scene of its own.
+            What each capture is of; empty: each is of a scene of its own. A run is always one of its own.
         """
         captures = list(zip(*series, strict=True))
-        names: Sequence[Hashable] = scenes or range(len(captures))
+        names: Sequence[Hashable] = range(len(captures)) if metric.of.of_run or not scenes else scenes
         members: dict[Hashable, list[int]] = {}
         for place, (name, capture) in enumerate(zip(names, captures, strict=True)):
             if any(len(outcome.group) for outcome in capture):
@@ -100,13 +114,15 @@ def interval_of(
     """
     if math.isnan(value):
         return Interval(*np.full(5, np.nan))
+    if metric.of.of_run:
+        return _of_runs(metric, parts, value, confidence)
     if metric.kind == "quantile":
         return intervals.quantile([np.abs(part) for part in parts], metric.level, confidence=confidence, blocks=within)
     if metric.kind in ("positive", "other"):
         left, weight = left_out(metric, parts, within)
         scale: intervals.Scale = "log" if metric.kind == "positive" else "plain"
         return intervals.of_left_out(
-            value, left, weight, scale=scale, units=len(parts), confidence=confidence, blocks=within
+            value, left, weight, scale=scale, enough=len(parts) >= INNER_UNITS, confidence=confidence, blocks=within
         )
     num, den = np.array([metric.parts(part) for part in parts]).T
     if metric.kind == "share":
@@ -115,6 +131,38 @@ def interval_of(
     return (intervals.ratio if metric.kind == "ratio" else intervals.mean)(
         num, den, most=most, confidence=confidence, blocks=within
     )
+
+
+def runs_behind(metric: type[Metric], parts: Sequence[FloatArray]) -> int:
+    """Runs in which a metric of runs is defined.
+
+    Parameters
+    ----------
+    metric : type of Metric
+    parts : sequence of array
+        Partial of each run.
+    """
+    return sum(metric.parts(part)[1] > 0 for part in parts)
+
+
+_SCALES: Mapping[str, intervals.Scale] = {"share": "logit", "ratio": "log", "positive": "log"}
+
+
+def _of_runs(metric: type[Metric], parts: Sequence[FloatArray], value: float, confidence: float) -> Interval:
+    """Interval of a mean over runs: Student's, on the scale of the metric; none where all runs say the same.
+
+    Runs of one scene that differ in their random numbers are drawn alike, which scenes are not.
+    """
+    nothing = Interval(np.asarray(value), *np.full(4, np.nan))
+    if runs_behind(metric, parts) < LEAST_RUNS:
+        return nothing
+    if metric.kind == "quantile":
+        return intervals.quantile([np.abs(part) for part in parts], metric.level, confidence=confidence)
+    left, weight = left_out(metric, parts, None)
+    if np.nanmax(left) - np.nanmin(left) <= 1e-12 * abs(value):
+        return nothing
+    scale = _SCALES.get(metric.kind, "plain")
+    return intervals.of_left_out(value, left, weight, scale=scale, enough=True, confidence=confidence)
 
 
 def left_out(metric: type[Metric], parts: Sequence[FloatArray], within: Blocks | None) -> tuple[FloatArray, FloatArray]:

@@ -224,7 +224,7 @@ def of_left_out(
     left: ArrayLike,
     weights: ArrayLike,
     *,
-    units: int,
+    enough: bool,
     scale: Scale = "plain",
     confidence: float = CONFIDENCE,
     blocks: Blocks | None = None,
@@ -238,8 +238,8 @@ def of_left_out(
         The value without each unit, or each of some equal shares of the units.
     weights : (..., parts) array
         How much each part adds, such as samples; for the degrees of freedom.
-    units : int
-        Units that there are.
+    enough : bool
+        Whether there are units enough for an interval; blocks always are.
     scale : {"logit", "log", "plain"}
         On which the interval is symmetric.
     confidence, blocks
@@ -248,8 +248,8 @@ def of_left_out(
     centre = np.asarray(value, float)
     middle = _scaled(centre, scale)
     spread = _spread(middle, _scaled(np.asarray(left, float), scale), np.asarray(weights, float), blocks)
-    enough = units >= INNER_UNITS or blocks is not None
-    reach = spread.error * student(spread.degrees, confidence) if enough else np.full_like(middle, np.nan)
+    known = enough or blocks is not None
+    reach = spread.error * student(spread.degrees, confidence) if known else np.full_like(middle, np.nan)
     none = np.full_like(middle, np.nan)
     return Interval(centre, _unscaled(middle - reach, scale), _unscaled(middle + reach, scale), none, none)
 

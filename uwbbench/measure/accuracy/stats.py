@@ -9,6 +9,7 @@ Conventions
   has, the metric says (:attr:`uwbbench.api.metric.Metric.kind`).
 * With one to three scenes, the ends of an estimate describe these recordings only (``within``): four blocks of each
   capture are compared with one another, never capture with capture. They rank nobody.
+* Where runs are judged as a whole, each run is a unit, whatever scene it is of; fewer than ten have no interval.
 * Nothing is drawn: the same outcomes give the same interval.
 """
 
@@ -23,8 +24,8 @@ import numpy as np
 
 from uwbbench.api.arrays import BoolArray, FloatArray, IntArray
 from uwbbench.api.metric import Metric, Outcome
-from uwbbench.measure.accuracy.boards import RANKED_UNITS, Contrast, board, contrast
-from uwbbench.measure.accuracy.evidence import Evidence, interval_of, left_out, merge
+from uwbbench.measure.accuracy.boards import Contrast, board, contrast
+from uwbbench.measure.accuracy.evidence import LEAST_RUNS, Evidence, interval_of, least_units, left_out, merge
 from uwbbench.measure.accuracy.groups import taken
 from uwbbench.measure.accuracy.intervals import CONFIDENCE, INNER_UNITS, exact
 
@@ -190,6 +191,8 @@ def paired_difference(
     sides = [left_out(metric, parts, evidence.recordings) for parts in evidence.blocks or evidence.units]
     (left, weight), (other_left, other_weight) = sides
     found = contrast(values[0] - values[1], left - other_left, (weight, other_weight), blocks=evidence.recordings)
+    if metric.of.of_run and len(evidence.units[0]) < LEAST_RUNS:
+        found = found._replace(error=np.array(math.nan), p_value=np.array(math.nan))
     pairs = zip(*evidence.units, strict=True)
     few = len(evidence.units[0]) < INNER_UNITS
     return Difference.of(
@@ -269,7 +272,7 @@ def drawn(
     """
     evidence = Evidence.of(metric, series, scenes)
     units = len(evidence.units[0])
-    if units < RANKED_UNITS:
+    if units < least_units(metric):
         return np.empty((0, len(series)))
     values = np.array(evidence.values(metric))
     left = np.stack([left_out(metric, parts, None)[0] for parts in evidence.units])

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from uwbbench.measure.accuracy.causes import NOT_KNOWN
+from uwbbench.measure.accuracy.rules import outcome_of
 from uwbbench.measure.accuracy.scoring import ScoringRules
 from uwbbench.results.comparison.units import Unit
 from uwbbench.results.error_causes import Error
@@ -61,7 +62,7 @@ def cause_changes(
     rule : ScoringRules
         Of the first run.
     """
-    if not units:
+    if not units or outcome_of(rule.scoring).of_run:
         return [], []
     if rule not in folders[1].rules:
         return [], ["causes of errors not compared: the runs were scored by different rules"]

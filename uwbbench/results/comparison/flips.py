@@ -20,6 +20,7 @@ from uwbbench.api.arrays import FloatArray, IntArray
 from uwbbench.api.errors import ScoringError
 from uwbbench.api.metric import Outcome
 from uwbbench.measure.accuracy.judge import judge
+from uwbbench.measure.accuracy.rules import outcome_of
 from uwbbench.measure.accuracy.scene import Scene
 from uwbbench.measure.accuracy.scoring import ScoringRules
 from uwbbench.results.comparison.units import Unit
@@ -79,6 +80,8 @@ def flips(
         The worst first.
     """
     counts: dict[str, Counter[tuple[str, str]]] = {}
+    if outcome_of(rule.scoring).of_run:  # which has no outcome of single frames
+        return counts, 0, []
     compared, worst = 0, list[Flip]()
     for unit in units:
         try:

@@ -15,7 +15,8 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from uwbbench.measure.accuracy.boards import RANKED_UNITS, Verdict, holm, verdict
+from uwbbench.measure.accuracy.boards import Verdict, holm, verdict
+from uwbbench.measure.accuracy.evidence import least_units
 from uwbbench.measure.accuracy.stats import Difference, Estimate, paired_difference
 from uwbbench.results.leaderboard.ranking import Ranking
 from uwbbench.results.leaderboard.suites import Contender
@@ -79,11 +80,12 @@ def changes(public: Sequence[Ranking], private: Sequence[Ranking]) -> list[Chang
             found = paired_difference(metric, hidden_ones, own, [scenes[name] for name in shared])
             estimates = one.estimates[ranking.main], its.estimates[ranking.main]
             compared.append((one.contender, ranking, other[ranking.board], estimates, found))
-    tested = [d.p_value if d.groups >= RANKED_UNITS else math.nan for *_, d in compared]
+    least = [least_units(ranking.metrics[ranking.main]) for _, ranking, *_ in compared]
+    tested = [d.p_value if d.groups >= few else math.nan for (*_, d), few in zip(compared, least, strict=True)]
     judged = []
     for (contender, ranking, hidden_board, estimates, d), p in zip(compared, holm(tested).tolist(), strict=True):
         metric = ranking.metrics[ranking.main]
-        word = verdict(d.contrast, p, d.groups, metric.margin)
+        word = verdict(d.contrast, p, d.groups, metric.margin, least_units(metric))
         loses = word == "differs" and metric.merit(d.value) < -metric.margin
         judged.append(Change(contender, ranking, hidden_board, estimates, d, p, word, loses))
     return judged

@@ -179,11 +179,15 @@ class RunFolder:
         """Read what a detector found, with the candidates, and with the poses and the map, if they were stored."""
         candidates = self._file("candidates", unit)
         found = tables.read_detections(self._file("detections", unit), candidates if candidates.is_file() else None)
-        poses, map_ = self._file("poses", unit), self._map(unit)
-        if not (poses.is_file() or map_.is_file()):
+        map_ = self._map(unit)
+        if not (self.has_poses(unit) or map_.is_file()):
             return found
-        on_the_way, smoothed = mapped.read_poses(poses)
+        on_the_way, smoothed = mapped.read_poses(self._file("poses", unit))
         return found.annotated(mapped=Mapped(on_the_way, mapped.read_map(map_), smoothed))
+
+    def has_poses(self, unit: str) -> bool:
+        """Whether poses of a mapper are stored."""
+        return self._file("poses", unit).is_file()
 
     def write_mapped(self, unit: str, made: Mapped | None, time_s: FloatArray) -> None:
         """Store poses and map of a mapper, in place of what an earlier session stored.

@@ -200,7 +200,8 @@ class _Verifier:
     def _capture_name(self, entry: Entry) -> str:
         for used in self.manifest["experiment"]["datasets"]:
             if used["label"] == entry.dataset:
-                return capture_name(used["use"], used["params"], entry.capture)
+                runs = self.manifest.get("runs", {}).get(entry.dataset, {})
+                return capture_name(used["use"], used["params"], entry.capture, runs.get(entry.capture, ()))
         raise ValueError(f"the manifest has no dataset {_shown(entry.dataset)}")
 
     def _stability(self, entry: Entry) -> None:
@@ -272,21 +273,26 @@ class _Verifier:
             )
 
     def _completeness(self) -> None:
-        """Every detector in every way that any of them was measured: a line that somebody took out is missed."""
+        """Every detector in every way that any of them was measured: a line that somebody took out is missed.
+
+        Mappers are measured on runs, others on captures.
+        """
         experiment, detectors = self.manifest["experiment"], self.manifest["detectors"]
         units = {(e.kind, e.detector, e.dataset, e.capture) for e in self.entries if e.kind != "listing"}
         read_only = {config["name"] for config in experiment["detectors"] if from_results(config)}
-        expected = {(kind, dataset, capture) for kind, _, dataset, capture in units}
+        mappers = {config["name"] for config in experiment["detectors"] if "mapper" in config}
+        mappers |= {e.detector for e in self.entries if self.folder.has_poses(e.unit)}
+        expected = {(kind, dataset, capture, name in mappers) for kind, name, dataset, capture in units}
         if experiment["stability"]:
-            expected.add(("stability", "", ""))
+            expected |= {("stability", "", "", of_runs) for of_runs in (False, True)}
         if experiment["latency"]["enabled"] and set(detectors) > read_only:
             timed = {unit[2] for unit in units if unit[0] == "latency"}
             untimed = {used["label"] for used in experiment["datasets"] if used.get("latency") is False}
             for dataset in sorted({unit[2] for unit in units if unit[0] == "accuracy"} - timed - untimed):
                 self._problem("journal.jsonl", f"no line about times on {_shown(dataset)}")
-        for kind, dataset, capture in sorted(expected):
+        for kind, dataset, capture, of_runs in sorted(expected):
             for detector in detectors:
-                if detector in read_only and kind != "accuracy":
+                if (detector in read_only and kind != "accuracy") or (detector in mappers) != of_runs:
                     continue
                 if (kind, detector, dataset, capture) not in units:
                     about = " ".join(_shown(name) for name in (kind, detector, dataset, capture) if name)

@@ -128,9 +128,9 @@ def top_view(title: str, case: Case, names: Mapping[str, str]) -> Spec:
 
 
 def titled(spec: Spec) -> Spec:
-    """Chart whose title names the detector that is shown at first."""
-    head = spec["title"]
-    return {**spec, "title": {**head, "text": head["text"].replace(DETECTOR, spec["params"][0]["value"])}}
+    """Chart whose title and subtitle name the detector that is shown at first."""
+    head = {name: text.replace(DETECTOR, spec["params"][0]["value"]) for name, text in spec["title"].items()}
+    return {**spec, "title": head}
 
 
 def placing(case: Case) -> str:

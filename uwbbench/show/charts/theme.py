@@ -62,6 +62,8 @@ def config(*, ink: str, soft: str, line: str, paper: str) -> dict[str, Any]:
             "truth": {"color": SERIES[2], "strokeWidth": 2.2},
             "structure": {"color": soft, "strokeWidth": 1.0},
             "path": {"color": soft, "strokeWidth": 1.2, "strokeDash": [4, 3]},
+            "cell": {"color": soft, "opacity": 0.45},
+            "echo": {"color": soft},
         },
     }
 

@@ -6,11 +6,14 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from uwbbench.api.errors import ConfigError, nearest
+from uwbbench.config.rules import Table
 from uwbbench.measure.accuracy.scoring import ScoringRules
+from uwbbench.results.drives import Frame
 from uwbbench.run.folder import RunFolder
 from uwbbench.show.figures.cdf import draw_cdf
 from uwbbench.show.figures.chain import draw_pipeline
 from uwbbench.show.figures.cir import draw_cir
+from uwbbench.show.figures.drive import draw_drive_map, draw_trajectories
 from uwbbench.show.figures.environment import draw_map
 from uwbbench.show.figures.properties import draw_properties
 from uwbbench.show.figures.radargram import draw_radargram
@@ -28,7 +31,8 @@ KINDS = {
     "properties": "peak prominence and width against distance, by material",
     "pipeline": "from all peaks through the filters to clusters, from above",
     "cdf": "distribution of the absolute errors",
-    "map": "clustered points, true outlines and robot path",
+    "map": "clustered points, or the map of a mapper, with true outlines and robot path",
+    "trajectory": "paths of mappers on a run, and their errors over time",
 }
 
 
@@ -43,16 +47,26 @@ class Choices:
     scoring, gate_m : str, float or None
         For ``cdf``; the gate for ``properties`` too.
     table : {"filtering", "mapping"} or None
-        For ``cdf``.
+        For ``cdf``; which poses for ``trajectory`` and ``map``.
+    aligned : bool or None
+        For ``trajectory`` and the ``map`` of a mapper: whether the estimate is laid over the truth as fits best, and
+        not by its start.
     """
 
     frame: int | None = None
     scoring: str | None = None
     gate_m: float | None = None
-    table: str | None = None
+    table: Table | None = None
+    aligned: bool | None = None
 
 
-_USED_BY = {"frame": ("cir",), "scoring": ("cdf",), "table": ("cdf",), "gate_m": ("cdf", "properties")}
+_USED_BY = {
+    "frame": ("cir",),
+    "scoring": ("cdf",),
+    "table": ("cdf", "trajectory", "map"),
+    "gate_m": ("cdf", "properties"),
+    "aligned": ("trajectory", "map"),
+}
 
 
 def check_kind(kind: str, choices: Choices) -> None:
@@ -93,6 +107,8 @@ def draw_capture(kind: str, capture: Capture, detector: Pipeline | None, choices
         return draw_radargram(capture, detector)
     if detector is None:
         raise ConfigError(f"the kind '{kind}' shows what a detector does: give one with --detector")
+    if kind == "trajectory":
+        raise ConfigError(f"the kind '{kind}' shows what a mapper made of a run: plot it from a run folder")
     if kind == "cir":
         return draw_cir(capture, detector, choices.frame)
     gate_m = 0.20 if choices.gate_m is None else choices.gate_m
@@ -143,5 +159,10 @@ def _draw_results(kind: str, results: list[Result], rules: ScoringRules, choices
         if len(detectors) > 1:
             raise ConfigError(f"{where}: choose one with --detector: {', '.join(detectors)}")
         return draw_properties(results, rules.gate_m)
+    frame: Frame = "aligned" if choices.aligned else "start"
+    if kind == "trajectory":
+        return draw_trajectories(results, choices.table or "filtering", frame)
     result = one_of(results, where)
+    if kind == "map" and result.detections.mapped is not None:
+        return draw_drive_map(result, choices.table or "filtering", frame)
     return draw_map(result) if kind == "map" else draw_pipeline(result)

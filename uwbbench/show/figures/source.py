@@ -10,6 +10,7 @@ from uwbbench.api import registry
 from uwbbench.api.capture import Capture, CaptureHeader
 from uwbbench.api.detections import Detections
 from uwbbench.api.errors import ConfigError, StoreError, nearest
+from uwbbench.api.mapper import Mapped
 from uwbbench.api.stage import Filter
 from uwbbench.detect.pipeline import Pipeline
 from uwbbench.measure.accuracy.scoring import ScoringRules
@@ -64,10 +65,11 @@ class Result:
 
 def about(header: CaptureHeader) -> str:
     """Sentence that names a capture, and says so where it is simulated."""
-    several = f", receiver {header.radar.receiver}" if header.radar.receiver != "main" else ""
+    names = [radar.receiver for radar in header.radars or (header.radar,)]
+    several = f", receiver{'s' * (len(names) > 1)} {', '.join(names)}" if names != ["main"] else ""
     channel = f", channel {header.radar.channel}" if header.radar.channel else ""
-    kind = "SIMULATED capture" if header.source == "simulated" else "Measured capture"
-    return f"{kind} {header.name}{channel}{several}."
+    kind = "SIMULATED" if header.source == "simulated" else "Measured"
+    return f"{kind} {'run' if header.radars else 'capture'} {header.name}{channel}{several}."
 
 
 def from_capture(capture: Capture, detector: Pipeline) -> Result:
@@ -150,6 +152,20 @@ def one_of(results: list[Result], where: str) -> Result:
         if len(names) > 1:
             raise ConfigError(f"{where}: choose one with {option}: {', '.join(names)}")
     return results[0]
+
+
+def mapped_of(result: Result) -> Mapped:
+    """Poses and map of a result.
+
+    Raises
+    ------
+    ConfigError
+        If its detector has no mapper.
+    """
+    mapped = result.detections.mapped
+    if mapped is None:
+        raise ConfigError(f"detector '{result.detector}' has no mapper: it hands out no poses and makes no map")
+    return mapped
 
 
 def _distinct(results: list[Result], key: Callable[[Result], str]) -> list[str]:

@@ -28,7 +28,8 @@ def _sentence(content: Content, about: Mapping[str, Any], estimates: Mapping[str
     plural = "capture" if about["captures"] == 1 else "captures"
     what = f"{about['captures']} {about['source']} {plural} of {content.datasets[about['dataset']]}"
     leader = content.detectors[about["detector"]]
-    text = f"On {what} ({about['scored_frames']} scored frames, {about['scoring']} scoring), "
+    scored = "" if metrics[main.name].of.of_run else f"{about['scored_frames']} scored frames, "
+    text = f"On {what} ({scored}{about['scoring']} scoring), "
     if not estimates[main.name].value > 0 and main.better == "higher":
         return f"{text}no detector found anything."
     board = about["dataset"], about["source"], about["scoring"], about["table"]

@@ -13,22 +13,25 @@ import numpy as np
 
 from uwbbench.measure.accuracy.stats import Estimate
 from uwbbench.results.cases import Case, cases
+from uwbbench.results.drive_cases import drive_cases
 from uwbbench.results.pareto import Speed, speeds_of_run
 from uwbbench.results.report import Report
 from uwbbench.results.results import Scored
 from uwbbench.results.set_aside import SetAside
 from uwbbench.results.slices import Board, Slice, cuts, range_edges_m, slices, span_name
 from uwbbench.results.times import in_words
+from uwbbench.run.folder.journal import Entry
 from uwbbench.show.charts import time_chart
 from uwbbench.show.charts.chart import Spec
 from uwbbench.show.looks import Look, looks
 from uwbbench.show.page.board_charts import BOARD_CHARTS, drawn
 from uwbbench.show.page.captures import look
+from uwbbench.show.page.drives import drive_look
 from uwbbench.show.page.timed import COLUMNS, timed_cells
 from uwbbench.show.text.numbers import rounded
 from uwbbench.show.text.quantity import Quantity
 from uwbbench.show.text.sheet import labels
-from uwbbench.show.text.wording import TABLES, set_aside_warning
+from uwbbench.show.text.wording import set_aside_warning, table_name
 
 
 class Content:
@@ -143,13 +146,22 @@ class Content:
     @cached_property
     def cases(self) -> list[Case]:
         """Captures to look at."""
-        entries = [e for e in self.report.entries if (e.kind, e.status) == ("accuracy", "done")]
-        return list(cases(self.report.folder, entries, self.scored, self.leaders, self.report.metrics))
+        return list(cases(self.report.folder, self._done, self.scored, self.leaders, self.report.metrics))
+
+    @property
+    def _done(self) -> list[Entry]:
+        return [entry for entry in self.report.entries if (entry.kind, entry.status) == ("accuracy", "done")]
 
     @cached_property
     def looks(self) -> list[dict[str, Any]]:
         """Radargram and map of each case, with what a reader must know."""
         return [look(self, case) for case in self.cases]
+
+    @cached_property
+    def drives(self) -> list[dict[str, Any]]:
+        """Map and errors over time of the middle run of each dataset with mappers."""
+        known = drive_cases(self.report.folder, self._done, self.scored, self.leaders, self.report.metrics)
+        return [drive_look(self, case) for case in known]
 
     @cached_property
     def board_charts(self) -> dict[str, list[dict[str, Spec | None]]]:
@@ -201,6 +213,7 @@ class Content:
                 kind: {"specs": specs, "empty": BOARD_CHARTS[kind].empty} for kind, specs in self.board_charts.items()
             },
             "looks": [{"radargram": one["radargram"], "map": one["map"]} for one in self.looks],
+            "drives": [{"map": one["map"], "errors": one["errors"]} for one in self.drives],
         }
 
     def _board(self, board: Board, materials: Mapping[str, str]) -> dict[str, Any]:
@@ -214,7 +227,7 @@ class Content:
         return {
             "dataset": f"{self.datasets[dataset]} ({source})",
             "scoring": scoring,
-            "table": TABLES[table],
+            "table": table_name(scoring, table),
             "columns": metrics.defined(exhaustive=exhaustive),
             "main": metrics.ranking(exhaustive=exhaustive),
             "cuts": same,

@@ -50,10 +50,13 @@
     if (!spec) { place.textContent = why; return null; }
     place.replaceChildren();
     const fitted = structuredClone(spec), letters = Math.max(24, Math.floor(place.clientWidth / 8.2));
-    const head = { ...spec.title }, chosen = place.closest("figure").parentElement.querySelector("label.single select")?.value;
+    const around = place.closest("[data-drive]") ?? place.closest("figure").parentElement;
+    const head = { ...spec.title }, chosen = around.querySelector("label.single select")?.value;
     if (chosen !== undefined && spec.params) {
       fitted.params[0].value = chosen;
-      head.text = head.text.replace("{detector}", () => chosen);
+      for (const part of ["text", "subtitle"]) head[part] = head[part]?.replace("{detector}", () => chosen);
+      const time = around.querySelector("input[type=range]");
+      if (time) fitted.params[1].value = Number(time.value);
     }
     fitted.title.text = wrapped(head.text, letters);
     fitted.title.subtitle = wrapped(head.subtitle ?? "", letters * 1.12);
@@ -203,6 +206,17 @@
       place.closest("div:not(.chart)").querySelector("select")?.addEventListener("change", () => later(() => draw(place, specs[kind])));
       later(() => draw(place, specs[kind]));
     }
+  }
+  for (const drive of document.querySelectorAll("[data-drive]")) {
+    const specs = data.drives[Number(drive.dataset.drive)], time = drive.querySelector("input[type=range]");
+    const places = [...drive.querySelectorAll("[data-drawn]")];
+    const drawn = () => { for (const place of places) later(() => draw(place, specs[place.dataset.drawn])); };
+    drive.querySelector("select").addEventListener("change", drawn);
+    time.addEventListener("input", () => {
+      drive.querySelector("output").textContent = Number(time.value).toFixed(1) + " s";
+      for (const place of places) views.get(place)?.view.signal("until", Number(time.value)).runAsync();
+    });
+    drawn();
   }
 
   later(() => { root.dataset.ready = "yes"; });

@@ -52,6 +52,7 @@ def page(content: Content) -> str:
         lead=sentence(report.experiment["description"]),
         sections=[(part, _tables(content, part.sheets), _tables(content, part.folded)) for part in parts],
         looks=content.looks,
+        drives=content.drives,
         facts=_facts(session, report.experiment),
         manifest=json.dumps(_without_hashes(manifest), indent=2, ensure_ascii=False),
         made=f"Made by uwbbench {session['versions']['uwbbench']} from a run started {session['started']}.",
@@ -94,6 +95,9 @@ def pictures(content: Content) -> Iterator[Picture]:
         for kind in ("radargram", "map"):
             if look[kind] is not None:
                 yield Picture(f"{kind}-{place + 1}", scene_charts.titled(look[kind]))
+    for place, drive in enumerate(content.drives):
+        for kind in ("map", "errors"):
+            yield Picture(f"drive-{kind}-{place + 1}", scene_charts.titled(drive[kind]))
 
 
 def write_figures(content: Content, folder: Path) -> list[Path]:

@@ -21,7 +21,7 @@ class Section:
         What it says, first of all.
     warnings : tuple of str
         What must be known before a number of it is used.
-    layout : {"plain", "leaderboard", "looks", "manifest"}
+    layout : {"plain", "leaderboard", "looks", "drives", "manifest"}
         A part that the template writes for this section alone.
     charts : tuple of dict
         Vega-Lite, the same whatever board is chosen.
@@ -39,7 +39,7 @@ class Section:
     title: str
     sentences: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
-    layout: Literal["plain", "leaderboard", "looks", "manifest"] = "plain"
+    layout: Literal["plain", "leaderboard", "looks", "drives", "manifest"] = "plain"
     charts: tuple[Spec, ...] = ()
     of_board: tuple[str, ...] = ()
     sheets: tuple[Sheet, ...] = ()

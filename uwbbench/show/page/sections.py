@@ -10,8 +10,10 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from uwbbench.api.text import counted
-from uwbbench.results.verdicts import BOUNDS, INTERVALS
+from uwbbench.measure.accuracy.rules import outcome_of
+from uwbbench.results.verdicts import BOUNDS, INTERVALS, RUN_INTERVALS
 from uwbbench.show.page import answer, error_sections, limits_section
+from uwbbench.show.page.drives import drives
 from uwbbench.show.page.limits_section import limits
 from uwbbench.show.page.section import Section
 from uwbbench.show.text.report import Tables
@@ -67,8 +69,9 @@ def leaderboard(content: Content) -> Section | None:
         f"{content.report.timed}; absolute ones hold on one machine only, the ratio travels."
     )
     tracks = [TRACK_ERRORS] if any(board[2] == "track" for board in content.boards) else []
+    runs = [RUN_INTERVALS] if any(outcome_of(board[2]).of_run for board in content.boards) else []
     bounds = [BOUNDS] if content.report.bounds else []
-    return Section("leaderboard", "Leaderboard", layout="leaderboard", notes=(note, *tracks, *bounds))
+    return Section("leaderboard", "Leaderboard", layout="leaderboard", notes=(note, *tracks, *runs, *bounds))
 
 
 def pareto(content: Content) -> Section | None:
@@ -162,6 +165,7 @@ SECTIONS: tuple[Writer, ...] = (
     error_sections.causes,
     error_sections.curves,
     looks,
+    drives,
     latency,
     paper_later,
     stability,

@@ -7,13 +7,13 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
-from uwbbench.measure.accuracy.boards import RANKED_UNITS
+from uwbbench.measure.accuracy.evidence import least_units
 from uwbbench.results.leaderboard.ranking import Ranking, Standing, rankings, reference_of
 from uwbbench.results.leaderboard.runs import Run
 from uwbbench.results.leaderboard.suites import Contender, Suite
 from uwbbench.results.results import errors_in
 from uwbbench.results.times import WORDS as TIMED
-from uwbbench.results.verdicts import BOUNDS, WITHIN, WORDS, listed
+from uwbbench.results.verdicts import BOUNDS, RUN_INTERVALS, WITHIN, WORDS, listed
 from uwbbench.run.folder.identity import digest
 from uwbbench.show.html.cell import Cell, Table
 from uwbbench.show.looks import Look, looks
@@ -25,7 +25,7 @@ from uwbbench.show.site.names import Names
 from uwbbench.show.text.numbers import p_value
 from uwbbench.show.text.quantity import undefined_titles
 from uwbbench.show.text.sheet import sentence, shown
-from uwbbench.show.text.wording import TABLES
+from uwbbench.show.text.wording import table_name
 
 
 @dataclass(frozen=True)
@@ -143,7 +143,7 @@ class Content:
             frames = sum(len(part.outcome.group) for part in one.scored)
             errors = errors_in(part.outcome for part in one.scored)
             rows.append((*cells, Cell(str(frames)), Cell(str(errors))))
-        title = f"{scoring} scoring, {TABLES[table]}"
+        title = f"{scoring} scoring, {table_name(scoring, table)}"
         return Table(title, columns, tuple(rows), tuple(self._board_notes(ranking)))
 
     def detector_cell(self, standing: Standing) -> Cell:
@@ -180,9 +180,12 @@ class Content:
         yield from ranking.metrics.notes
         if ranking.ranks.bounds:
             yield BOUNDS
+        if ranking.ranks.unit == "run":
+            yield RUN_INTERVALS
         if not ranking.ranks.sets:
             there = "is 1" if ranking.ranks.scenes == 1 else f"are {ranking.ranks.scenes}"
-            yield f"No ranks: {RANKED_UNITS} scenes are needed, and there {there}."
+            least = least_units(ranking.metrics[ranking.main])
+            yield f"No ranks: {least} {ranking.ranks.unit}s are needed, and there {there}."
             if any(one.estimates[ranking.main].within for one in ranking.standings):
                 yield f"Intervals: {WITHIN}."
         elif any(one.ranks is None and not one.contender.bound for one in ranking.standings):
@@ -239,7 +242,16 @@ class Content:
             rows.append(
                 (*names, Cell(by.title), pair_cell(ranking, pair), Cell(p_value(pair.adjusted)), verdict, *counts)
             )
-        columns = ("first", "second", "metric", "difference", "adjusted p", "verdict", "captures", "scenes (n)")
+        columns = (
+            "first",
+            "second",
+            "metric",
+            "difference",
+            "adjusted p",
+            "verdict",
+            "captures",
+            f"{ranking.ranks.unit}s (n)",
+        )
         return Table("Compared in pairs", columns, tuple(rows))
 
     def suite_facts(self, suite: Suite) -> list[tuple[str, str]]:

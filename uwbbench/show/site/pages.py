@@ -21,7 +21,7 @@ from uwbbench.show.site.halves import halves_shown
 from uwbbench.show.site.matrix import CSV, matrix
 from uwbbench.show.text.numbers import interval, number, p_value
 from uwbbench.show.text.sheet import sentence, shown
-from uwbbench.show.text.wording import TABLES
+from uwbbench.show.text.wording import table_name
 
 
 @dataclass(frozen=True)
@@ -167,7 +167,7 @@ def _dataset(content: Content, section: Section) -> Page:
     )
     boards = [
         Part(
-            title=f"{ranking.board[2]} scoring, {TABLES[ranking.board[3]]}",
+            title=f"{ranking.board[2]} scoring, {table_name(ranking.board[2], ranking.board[3])}",
             tables=(content.board(ranking),),
             folded=(content.pairs(ranking),),
         )

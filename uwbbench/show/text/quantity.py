@@ -42,6 +42,7 @@ class Quantity:
         """How a registered metric is shown."""
         unit, factor, digits = metric.scale()
         samples = "detections" if metric.merge == "stack" else "frames"
+        samples = "runs" if metric.of.of_run else samples
         return cls(name, metric.title or name, unit, digits, factor, metric.better, samples)
 
     @classmethod
@@ -53,6 +54,11 @@ class Quantity:
     def axis(self) -> str:
         """Title of an axis."""
         return f"{self.title} ({self.unit})" if self.unit else self.title
+
+    @property
+    def evidence(self) -> str:
+        """What is counted as one piece of evidence."""
+        return "run" if self.samples == "runs" else "scene"
 
     def scaled(self, value: float) -> float:
         """Value in the shown unit."""
@@ -71,6 +77,8 @@ class Quantity:
         """Value with unit, interval and count, or why there is none."""
         if math.isnan(estimate.value):
             return "undefined"
+        if self.evidence == "run":  # each is one sample, and one piece of evidence
+            return f"{self.value_of(estimate)}, {counted(estimate.n, 'run')}"
         return f"{self.value_of(estimate)}, n = {estimate.n} {self.samples}, {_scenes(estimate)}"
 
 

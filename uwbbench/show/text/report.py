@@ -8,11 +8,12 @@ from pathlib import Path
 from typing import Any
 
 from uwbbench.api.text import counted, one_line
+from uwbbench.measure.accuracy.evidence import LEAST_RUNS
 from uwbbench.measure.accuracy.intervals import INNER_UNITS, failing_share
 from uwbbench.measure.accuracy.metrics.choice import MetricChoice
 from uwbbench.results.report import Report
 from uwbbench.results.times import ROWS
-from uwbbench.results.verdicts import BOUNDS, WITHIN, rank_text
+from uwbbench.results.verdicts import BOUNDS, RUN_INTERVALS, WITHIN, rank_text
 from uwbbench.show.text.captures_sheets import captures_sheet, each_capture_sheet
 from uwbbench.show.text.class_sheets import class_sheets
 from uwbbench.show.text.error_sheets import cause_sheets, curve_sheets, main_causes
@@ -22,7 +23,7 @@ from uwbbench.show.text.paper_sheets import paper_sheets, published_sheets
 from uwbbench.show.text.quantity import Quantity, undefined_titles
 from uwbbench.show.text.reported_sheets import reported_sheets
 from uwbbench.show.text.sheet import Sheet, escaped, sentence, shown
-from uwbbench.show.text.wording import ERRORS, TABLES, TRACK_ERRORS, set_aside_warning
+from uwbbench.show.text.wording import ERRORS, TRACK_ERRORS, set_aside_warning, table_name
 
 
 def sheets(report: Report) -> list[Sheet]:
@@ -178,10 +179,14 @@ def _leaderboards(report: Report, rows_of: Sequence[tuple[dict[str, Any], Any]])
             cells = [interval(e.value, e.low, e.high, by.digits, by.factor) for e, by in shown_here]
             cells[1:1] = [time_us(about, "p50_us"), time_us(about, "p99_us")]
             cells += [number(about["chance_recall"], 3)] if open_world else []
-            cells += [str(about["errors"]), f"{about['scored_frames']} of {about['frames']}"]
+            of_run = metrics[main].of.of_run
+            cells += [str(estimates[main].n if of_run else about["errors"])]
+            cells += [
+                f"{about['frames'] - about['unprocessed'] if of_run else about['scored_frames']} of {about['frames']}"
+            ]
             ranks = None if about["rank_low"] is None else (about["rank_low"], about["rank_high"])
             rows.append((shown(about["detector"]), rank_text(ranks), *cells))
-        title = f"{shown(dataset)}, {source.upper()}: {scoring} scoring, {TABLES[table]}"
+        title = f"{shown(dataset)}, {source.upper()}: {scoring} scoring, {table_name(scoring, table)}"
         board = dataset, source, scoring, table
         few = [one for one in report.set_aside if (one.dataset, one.source, one.scoring, "filtering") == board]
         seen = table == "mapping" and report.folder.rules[0].surface == "visible"
@@ -209,7 +214,9 @@ def _leaderboard_notes(
 ) -> Iterator[str]:
     open_world = any(not about["exhaustive"] for about, _ in members)
     main = quantities[metrics.ranking(exhaustive=not open_world)]
-    yield TRACK_ERRORS if members[0][0]["scoring"] == "track" else ERRORS
+    of_run = metrics[main.name].of.of_run
+    if not of_run:
+        yield TRACK_ERRORS if members[0][0]["scoring"] == "track" else ERRORS
     if metrics.listed:
         yield f"Ranked by {main.title}."
     if any(about["bound"] for about, _ in members):
@@ -220,7 +227,7 @@ def _leaderboard_notes(
             f"{undefined_titles(metrics)} are undefined; errors are of matches, and recall is to be read against that "
             "of random ranges."
         )
-    yield from _evidence(members, main)
+    yield from _evidence_of_runs(members, main) if of_run else _evidence(members, main)
     for about, _ in members:
         if about["invalid"] or about["unprocessed"]:
             yield (
@@ -247,9 +254,22 @@ def _evidence(members: list[tuple[dict[str, Any], Any]], main: Quantity) -> Iter
         )
         yield f"Intervals: inner ones, for scenes like these. Outer ones of {main.axis}, at worst: {outer}."
     if 1 < scenes < INNER_UNITS:
-        for about, estimates in members:
-            values = ", ".join(number(value, main.digits, main.factor) for value in estimates[main.name].per_group)
-            yield f"{main.axis} of each scene, {shown(about['detector'])}: {values or 'none'}"
+        yield from _values(members, main, "scene")
+
+
+def _evidence_of_runs(members: list[tuple[dict[str, Any], Any]], main: Quantity) -> Iterator[str]:
+    """The same where each run is one number."""
+    runs = max(about["captures"] for about, _ in members)
+    yield f"{counted(runs, 'run')}{'' if runs >= LEAST_RUNS else ': no interval'}. {RUN_INTERVALS}"
+    if 1 < runs < INNER_UNITS:
+        yield from _values(members, main, "run")
+
+
+def _values(members: list[tuple[dict[str, Any], Any]], main: Quantity, unit: str) -> Iterator[str]:
+    """Values of each of a few scenes or runs."""
+    for about, estimates in members:
+        values = ", ".join(number(value, main.digits, main.factor) for value in estimates[main.name].per_group)
+        yield f"{main.axis} of each {unit}, {shown(about['detector'])}: {values or 'none'}"
 
 
 def _stability(report: Report) -> Sheet:

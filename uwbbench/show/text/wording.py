@@ -11,6 +11,23 @@ from uwbbench.show.text.sheet import shown
 TABLES = {"filtering": "after filtering (range)", "mapping": "after mapping (position)"}
 """Names of the paper's two tables."""
 
+_OF_RUNS = {
+    ("pose", "filtering"): "as handed out on the way",
+    ("pose", "mapping"): "smoothed",
+    ("map", "filtering"): "at the end",
+}
+
+
+def table_name(scoring: str, table: str) -> str:
+    """Name of a table of a scoring.
+
+    Examples
+    --------
+    >>> table_name("object", "filtering"), table_name("pose", "mapping")
+    ('after filtering (range)', 'smoothed')
+    """
+    return _OF_RUNS.get((scoring, table)) or TABLES[table]
+
 
 ERRORS = "Errors are those of all retained detections; 'of matches' counts true positives only: read it with recall."
 TRACK_ERRORS = "Errors of tracks are those where a track is matched with an object: read them with recall."

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable, Mapping
+from typing import Any
 
 import numpy as np
 
 from uwbbench.api.metric import Outcome
-from uwbbench.api.outcomes import PresenceOutcome, SegmentOutcome, TrackOutcome
+from uwbbench.api.outcomes import MapOutcome, PoseOutcome, PresenceOutcome, SegmentOutcome, TrackOutcome
 from uwbbench.measure.accuracy.groups import taken
 
 FRAMES = 200
@@ -125,8 +127,58 @@ def _presence(plain: Outcome) -> PresenceOutcome:
     )
 
 
+def _poses(plain: Outcome) -> PoseOutcome:
+    """A run whose poses are off by the errors of the frames, and by a metre where one is missed or false."""
+    off_m = (plain.fn + plain.fp).astype(np.float64)
+    np.add.at(off_m, plain.error_frame[plain.matched], plain.error_m[plain.matched])
+    rows = np.arange(FRAMES)
+    return PoseOutcome(
+        **_nothing_counted(plain, FRAMES),
+        step=rows,
+        aligned_m=np.abs(off_m),
+        start_m=2 * np.abs(off_m),
+        heading_rad=off_m,
+        nees=3 + off_m**2,
+        nearest_m=np.stack([off_m, off_m], axis=1) / 2,
+        pair_frame=rows[:-1],
+        moved_m=np.abs(off_m[1:]),
+        turned_rad=off_m[1:],
+    )
+
+
+def _maps(plain: Outcome) -> MapOutcome:
+    """A run with as many landmarks as there are frames, each a point of an outline."""
+    true = plain.matched
+    off_m = np.where(true, np.abs(plain.error_m), 1.0)
+    one = {name: np.array([int(getattr(plain, name).sum())]) for name in ("tp", "fp", "fn")}
+    facts = _nothing_counted(plain, 1) | one
+    facts |= {"error_m": np.where(true, off_m, np.nan), "matched": true, "error_frame": np.zeros(len(true), np.int64)}
+    missed = np.ones(int(plain.fn.sum()))
+    shared = np.array([int((off_m < 0.1).sum())])
+    made = MapOutcome(
+        **facts,
+        duplicates=one["fp"],
+        shared_cells=shared,
+        covered_cells=2 * one["tp"] + one["fp"] + one["fn"] - shared,
+        map_frame=np.zeros(len(off_m), np.int64),
+        map_m=off_m,
+        true_frame=np.zeros(int(true.sum()) + len(missed), np.int64),
+        true_m=np.concatenate([off_m[true], missed]),
+    )
+    return dataclasses.replace(made, start=made)
+
+
+def _nothing_counted(plain: Outcome, rows: int) -> dict[str, Any]:
+    """What every outcome holds, of a run as a whole."""
+    none = np.zeros(rows, np.int64)
+    nothing = {"error_frame": np.zeros(0, np.int64), "error_m": np.zeros(0), "matched": np.zeros(0, bool)}
+    return {"group": none, "tp": none, "fp": none, "fn": none, **nothing, "duration_s": plain.duration_s}
+
+
 _MADE: Mapping[type[Outcome], Callable[[Outcome], Outcome]] = {
     TrackOutcome: _tracks,
     SegmentOutcome: _segments,
     PresenceOutcome: _presence,
+    PoseOutcome: _poses,
+    MapOutcome: _maps,
 }

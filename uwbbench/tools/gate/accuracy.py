@@ -25,6 +25,7 @@ from uwbbench.api.detections import Detections
 from uwbbench.api.errors import ScoringError
 from uwbbench.api.metric import Metric, Outcome
 from uwbbench.config.source import CaptureRef
+from uwbbench.measure.accuracy.rules import outcome_of
 from uwbbench.measure.accuracy.scoring import Region, ScoringRules, outcomes
 from uwbbench.measure.accuracy.stats import Estimate, estimated, paired_difference
 from uwbbench.run.folder.tables import read_detections
@@ -109,7 +110,7 @@ def accuracy_check(gate: Gate, rule: AccuracyModel, label: str, found: list[Foun
     metric: type[Metric] = registry.load_plugin("metrics", rule.metric)
     title = metric.title or rule.metric
     name = f"{title} ({rule.scoring} scoring, {rule.table}) on {label}{source}"
-    samples = "errors" if metric.merge == "stack" else "frames"
+    samples = "runs" if metric.of.of_run else "errors" if metric.merge == "stack" else "frames"
     blank = Check(
         kind="accuracy", name=name, verdict=GateVerdict.INVALID, quantity=title, unit=metric.unit, counted=samples
     )
@@ -171,10 +172,11 @@ def _compared(check: Check, rule: AccuracyModel, better: str, found: Estimate) -
     if -sign * found.value <= rule.tolerance:
         return replace(check, verdict=GateVerdict.PASS)
     if math.isnan(found.low):
+        evidence = "runs" if outcome_of(rule.scoring).of_run else "scenes"
         return replace(
             check,
             verdict=GateVerdict.INCONCLUSIVE,
-            reason=f"worse, but {found.groups} scenes are too few for an interval",
+            reason=f"worse, but {found.groups} {evidence} are too few for an interval",
             advice="gate on more scenes, or on captures of half a minute; or allow a tolerance",
         )
     least_loss = -found.high if better == "higher" else found.low

@@ -11,7 +11,7 @@ Conventions
 from __future__ import annotations
 
 import math
-from typing import ClassVar, Literal
+from typing import ClassVar, Literal, TypeVar
 
 import numpy as np
 
@@ -20,6 +20,8 @@ from uwbbench.api.metric import Kind, Outcome
 from uwbbench.api.outcomes import PoseOutcome
 from uwbbench.measure.accuracy.metrics.run import RunMetric, mean, root_mean_square
 from uwbbench.measure.accuracy.trajectories import squared_error_band
+
+_Value = TypeVar("_Value", float, FloatArray)
 
 _DEGREES = ("deg", math.degrees(1.0), 2)
 
@@ -159,6 +161,11 @@ class Nees(_PoseMetric):
         """Mean of the poses of which it is known."""
         nees = _poses(outcome).nees
         return mean(nees[np.isfinite(nees)])
+
+    @classmethod
+    def merit(cls, value: _Value) -> _Value:
+        """Larger the nearer to 3."""
+        return -abs(value - 3)
 
 
 class NeesInside(_PoseMetric):
