@@ -37,7 +37,7 @@ def test_listing_names_imports_no_plugin_and_no_numpy():
     [
         ("stages", "peeks", r"no stage named 'peeks' is installed\. Did you mean 'peaks'\?"),
         ("datasets", "pulson440-trail", r"no dataset named .* Did you mean 'pulson440-rail'\?"),
-        ("metrics", "qqqq", r"no metric named 'qqqq' is installed\. Known: average_precision, "),
+        ("metrics", "qqqq", r"no metric named 'qqqq' is installed\. Known: ate, ate_median, "),
     ],
 )
 def test_an_unknown_name_suggests_the_nearest(kind, name, message):

@@ -30,6 +30,7 @@ def test_list_names_every_shipped_detector(uwbbench) -> None:
 def test_list_without_kind_has_all_kinds(uwbbench) -> None:
     assert list(json.loads(uwbbench("list", "--json").stdout)) == [
         "stages",
+        "mappers",
         "detectors",
         "datasets",
         "metrics",

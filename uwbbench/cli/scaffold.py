@@ -24,6 +24,7 @@ class KindOption(StrEnum):
     """What can be made and checked."""
 
     STAGE = "stage"
+    MAPPER = "mapper"
     DETECTOR = "detector"
     DATASET = "dataset"
     METRIC = "metric"

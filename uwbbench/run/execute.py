@@ -144,6 +144,7 @@ def _created(experiment: Experiment, todo: Plan, out: Path | None, jobs: int) ->
         **_code(experiment, todo),
         "scenes": todo.scenes,
         "skipped": todo.skipped,
+        **({"runs": todo.runs} if todo.runs else {}),
         **_reported(experiment),
         **({} if experiment.frozen is None else {"frozen": experiment.frozen.contents()}),
         "sessions": [environment.session(jobs)],
@@ -196,6 +197,7 @@ def _resumed(experiment: Experiment, todo: Plan, out: Path | None, jobs: int) ->
         **_code(experiment, todo),
         scenes={**folder.manifest.get("scenes", {}), **todo.scenes},
         skipped=todo.skipped,
+        **({"runs": todo.runs} if todo.runs else {}),
         sessions=[*folder.manifest["sessions"], environment.session(jobs)],
     )
     return folder

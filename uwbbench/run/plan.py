@@ -44,10 +44,8 @@ class Unit:
     @property
     def capture_id(self) -> str:
         """File name of the capture's header."""
-        ref, params = self.ref, self.ref.params
-        if isinstance(ref, RunRef) and ref.captures != (ref.name,):
-            params = {**params, "run": list(ref.captures)}
-        return capture_name(ref.dataset, params, ref.name)
+        ref = self.ref
+        return capture_name(ref.dataset, ref.params, ref.name, ref.captures if isinstance(ref, RunRef) else ())
 
 
 @dataclass(frozen=True)
@@ -64,12 +62,15 @@ class Plan:
         Scene of each capture, by dataset and capture.
     skipped : dict of str
         Optional datasets whose files are not there: the reason, by label.
+    runs : dict of dict
+        Captures of each run that a mapper is tried on, by dataset and run.
     """
 
     units: tuple[Unit, ...]
     failures: tuple[Entry, ...]
     scenes: dict[str, dict[str, str]] = field(default_factory=dict)
     skipped: dict[str, str] = field(default_factory=dict)
+    runs: dict[str, dict[str, list[str]]] = field(default_factory=dict)
 
 
 def plan(experiment: Experiment) -> Plan:
@@ -85,6 +86,7 @@ def plan(experiment: Experiment) -> Plan:
     failures: list[Entry] = []
     scenes: dict[str, dict[str, str]] = {}
     skipped: dict[str, str] = {}
+    of_runs: dict[str, dict[str, list[str]]] = {}
     for source in experiment.datasets:
         chosen = [d for d in experiment.detectors if not source.detectors or d.name in source.detectors]
         try:
@@ -119,12 +121,15 @@ def plan(experiment: Experiment) -> Plan:
         mapping = [d for d in chosen if d.of_runs]
         pairs: list[tuple[CaptureRef | RunRef, DetectorConfig]] = [(ref, d) for ref in references for d in single]
         pairs += [(run, d) for run in runs for d in mapping]
+        if runs:
+            of_runs[source.label] = {run.name: list(run.captures) for run in runs}
         accuracy += [Unit("accuracy", d, source.label, ref) for ref, d in pairs]
         if source.timed:
             first = {references[0].name, *(run.name for run in runs[:1])}
             timed = [(ref, d) for ref, d in pairs if experiment.latency.captures == "all" or ref.name in first]
             latency += [Unit("latency", d, source.label, ref) for ref, d in timed if d.results is None]
-    return Plan(tuple(accuracy + (latency if experiment.latency.enabled else [])), tuple(failures), scenes, skipped)
+    units = tuple(accuracy + (latency if experiment.latency.enabled else []))
+    return Plan(units, tuple(failures), scenes, skipped, of_runs)
 
 
 def reason_of(error: BaseException) -> str:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 import numpy as np
 
 from uwbbench.api import FloatArray, LandmarkKind, wrap_angle
@@ -28,7 +30,7 @@ class AnchorModel:
         By how much ranges are too long.
     """
 
-    kind: LandmarkKind = "anchor"
+    kind: ClassVar[LandmarkKind] = "anchor"
 
     def __init__(self, mount: FloatArray, said: tuple[int, ...], bias_m: float) -> None:
         self._mount, self._said, self._bias_m = mount, list(said), bias_m

@@ -102,7 +102,7 @@ class Echoes:
         return self.range_m - np.hypot(offset[:, 0], offset[:, 1]), wrap_angle(self.heading_rad - heading_rad)
 
 
-def fit_line(echoes: Echoes, spread: Spread, start: FloatArray) -> tuple[FloatArray, FloatArray]:
+def fit_line(echoes: Echoes, spread: Spread, shared: Spread, start: FloatArray) -> tuple[FloatArray, FloatArray]:
     """The line whose echoes these most likely are, by Gauss-Newton steps from a guess.
 
     Least sum of squares of ranges and directions, each over its standard deviation: both have errors of their own,
@@ -114,18 +114,22 @@ def fit_line(echoes: Echoes, spread: Spread, start: FloatArray) -> tuple[FloatAr
     echoes : Echoes
         At least one.
     spread : Spread
-        Standard deviations of one echo.
+        Standard deviations of what each echo is off for itself.
+    shared : Spread
+        Standard deviations of what all are off alike, which no number of echoes takes away: what else stands near the
+        wall turns and delays the echoes of a stretch in the same way.
     start : (2,) array
         Line to start from.
 
     Returns
     -------
     (2,) array, (2, 2) array
-        Line, and the covariance of its two numbers: the inverse of the sum of ``J' R^-1 J``, with J the derivatives
+        Line, and the covariance of its two numbers: the inverse of ``J' R^-1 J``, with J the derivatives
         ``[[1, -s], [0, 1]]`` of range and direction, s the place of the receiver along the line.
     """
     line = np.array(start, dtype=np.float64)
-    near, turn = spread.range_m**-2, spread.heading_rad**-2
+    near = spread.range_m**-2
+    turn = 1 / (spread.heading_rad**2 + len(echoes) * shared.heading_rad**2)
     precision = np.eye(2)
     for _ in range(ROUNDS):
         farther_m, leftward = echoes.off_line(line)
@@ -137,7 +141,9 @@ def fit_line(echoes: Echoes, spread: Spread, start: FloatArray) -> tuple[FloatAr
         line = np.array([line[0] + step[0], float(wrap_angle(line[1] + step[1]))])
         if np.abs(step).max() < 1e-10:
             break
-    return line, np.asarray(np.linalg.inv(precision), np.float64)
+    covariance = np.asarray(np.linalg.inv(precision), np.float64)
+    covariance[0, 0] += shared.range_m**2
+    return line, covariance
 
 
 def fit_point(echoes: Echoes, spread: Spread, start_m: FloatArray) -> FloatArray:

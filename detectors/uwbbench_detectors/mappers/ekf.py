@@ -24,7 +24,9 @@ from uwbbench_detectors.mappers.rest import Rest, places_of
 class Model(Protocol):
     """How landmarks of one kind are seen; ``k`` numbers are measured of each."""
 
-    kind: LandmarkKind
+    @property
+    def kind(self) -> LandmarkKind:
+        """Which kind."""
 
     def expected(self, pose: FloatArray, marks: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """What would be measured of landmarks (m, 2) from a pose (3,).
@@ -130,6 +132,26 @@ class Ekf:
         """Add to the covariance (3, 3) of the pose, after something that the motion model does not know."""
         self._covariance[:3, :3] += covariance
 
+    def expected(self, model: Model, handle: int) -> tuple[FloatArray, FloatArray]:
+        """What would be measured of a near landmark now.
+
+        Parameters
+        ----------
+        model : Model
+        handle : int
+
+        Returns
+        -------
+        (k,) array, (k,) array
+            And standard deviations, as far as pose and landmark are not known.
+        """
+        start = self._at(handle)
+        measured, by_pose, by_mark = model.expected(self._mean[:3], self._mean[None, start : start + 2])
+        rows = np.array([0, 1, 2, start, start + 1])
+        by_both = np.concatenate([by_pose[0], by_mark[0]], axis=1)
+        spread = by_both @ self._covariance[np.ix_(rows, rows)] @ by_both.T
+        return measured[0], np.sqrt(np.diag(spread))
+
     def distances(
         self, model: Model, measured: FloatArray, noise: FloatArray, handles: list[int] | None = None
     ) -> tuple[list[int], FloatArray]:
@@ -163,7 +185,9 @@ class Ekf:
         weighed = np.linalg.solve(spread, off[:, :, None])[:, :, 0]
         return handles, np.asarray((weighed * off).sum(axis=1))
 
-    def update(self, model: Model, handle: int, measured: FloatArray, noise: FloatArray) -> float:
+    def update(
+        self, model: Model, handle: int, measured: FloatArray, noise: FloatArray, *, trusted: bool = True
+    ) -> float:
         """Take in a measurement of a landmark that is known to be this one.
 
         Parameters
@@ -172,6 +196,9 @@ class Ekf:
         handle : int
         measured : (k,) array
         noise : (k, k) array
+        trusted : bool
+            Whether the measurement may move the robot and the other landmarks. If not, the landmark alone learns from
+            it, and the covariance says so (Schmidt, Advances in Control Systems 3, 1966).
 
         Returns
         -------
@@ -183,9 +210,9 @@ class Ekf:
         expected, by_pose, by_mark = model.expected(self._mean[:3], self._mean[None, start : start + 2])
         off = model.differences(measured, expected)[0]
         self._marks[handle].support += 1
-        return self._correct(
-            np.array([0, 1, 2, start, start + 1]), np.concatenate([by_pose[0], by_mark[0]], axis=1), off, noise
-        )
+        rows = np.array([0, 1, 2, start, start + 1])
+        learning = None if trusted else rows[3:]
+        return self._correct(rows, np.concatenate([by_pose[0], by_mark[0]], axis=1), off, noise, learning)
 
     def add(self, model: Model, measured: FloatArray, noise: FloatArray, number: int | None = None) -> int:
         """Begin a landmark where a measurement places it.
@@ -221,14 +248,16 @@ class Ekf:
         return handle
 
     def remove(self, handle: int) -> None:
-        """Forget a landmark that is near, but not what it has said of the others."""
+        """Forget a landmark, but not what it has said of the others."""
+        del self._marks[handle]
+        if handle not in self._starts:
+            return  # it rests, and goes when the others are brought up to date
         start = self._at(handle)
         rows = [start, start + 1]
         self._mean = np.delete(self._mean, rows)
         self._covariance = np.delete(np.delete(self._covariance, rows, axis=0), rows, axis=1)
         self._rest.remove(rows)
         self._set_near([other for other in self._near if other != handle])
-        del self._marks[handle]
 
     def apart(self, one: int, other: int) -> float:
         """Squared Mahalanobis distance of two near landmarks of one kind from being at one place."""
@@ -251,10 +280,10 @@ class Ekf:
         self._marks[kept].support += self._marks[dropped].support
         self.remove(dropped)
 
-    def landmarks(self, least_support: int = 1) -> Landmarks:
-        """All landmarks with at least so much support, by their handles."""
+    def landmarks(self, handles: list[int] | None = None) -> Landmarks:
+        """Some landmarks by their handles, near or far, or all of them."""
         self._settle()
-        kept = sorted(handle for handle, mark in self._marks.items() if mark.support >= least_support)
+        kept = sorted(self._marks if handles is None else handles)
         if not kept:
             return Landmarks.none()
         marks = [self._marks[handle] for handle in kept]
@@ -283,9 +312,13 @@ class Ekf:
         first, second = self._at(one), self._at(other)
         rows = np.array([first, first + 1, second, second + 1])
         difference = self._mean[first : first + 2] - self._mean[second : second + 2]
+        if self._marks[one].kind == "line":
+            difference[1] = wrapped(difference[1])
         return rows, difference, np.hstack([np.eye(2), -np.eye(2)])
 
-    def _correct(self, rows: IntArray, seen: FloatArray, off: FloatArray, noise: FloatArray) -> float:
+    def _correct(
+        self, rows: IntArray, seen: FloatArray, off: FloatArray, noise: FloatArray, learning: IntArray | None = None
+    ) -> float:
         """Update with what depends on a few values of the near state alone.
 
         The covariance is that of Joseph's form, ``(I - K H) P (I - K H)' + K R K'``, multiplied out so that the zeros
@@ -301,6 +334,8 @@ class Ekf:
             Innovation.
         noise : (k, k) array
             Covariance R.
+        learning : (l,) int array, optional
+            Places of the near state that are corrected; everything if left out.
 
         Returns
         -------
@@ -311,11 +346,15 @@ class Ekf:
         spread = seen @ across[rows] + noise
         weight = np.asarray(np.linalg.inv(spread), np.float64)
         gain = across @ weight
+        if learning is not None:
+            held = np.ones(len(gain), bool)
+            held[learning] = False
+            gain[held] = 0.0
         self._mean += gain @ off
         self._mean[2] = wrapped(self._mean[2])
         half = gain @ across.T - gain @ (spread / 2) @ gain.T
         self._covariance -= half + half.T
-        self._rest.correct(seen, weight, off, gain, rows)
+        self._rest.correct(seen, weight if learning is None else None, off, gain, rows)
         return float(off @ weight @ off)
 
     def _settle(self) -> None:

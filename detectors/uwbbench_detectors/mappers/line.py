@@ -57,6 +57,13 @@ class LineModel:
         return np.array([measured[0] + across @ pose[:2], alpha_rad]), by_pose, by_measured
 
 
+def facing(line: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """A line (2,) with its normal pointing towards it, and the signs (2,) that its two numbers change with."""
+    if line[0] >= 0:
+        return line, np.ones(2)
+    return np.array([-line[0], float(wrap_angle(line[1] + np.pi))]), np.array([-1.0, 1.0])
+
+
 def normal(alpha_rad: FloatArray | float) -> FloatArray:
     """Unit vectors (..., 2) in the directions (...)."""
     return np.stack([np.cos(alpha_rad), np.sin(alpha_rad)], axis=-1)

@@ -25,7 +25,6 @@ class MotionParams(Params):
     )
     turn_scale_sd: float = Field(0.03, ge=0, lt=1, description="The same for turns.")
     fastest_m_s: float = Field(3.0, gt=0, description="Odometry that moves faster has jumped.")
-    fastest_rad_s: float = Field(8.0, gt=0, description="Odometry that turns faster has jumped.")
 
 
 def wrapped(angle_rad: float) -> float:
@@ -109,7 +108,9 @@ class Motion:
         return pose, by_head, noise
 
     def jumped(self, moved: FloatArray, elapsed_s: float) -> bool:
-        """Whether no robot moves like this: it was carried away, or its odometry was reset.
+        """Whether no robot moves as far as this: it was carried away, or its odometry was reset.
+
+        Turns are no sign: a robot that is slow along may spin on the spot.
 
         Parameters
         ----------
@@ -117,9 +118,7 @@ class Motion:
         elapsed_s : float
             Time that it took.
         """
-        p = self._params
-        too_far = math.hypot(moved[0], moved[1]) > p.fastest_m_s * elapsed_s
-        return too_far or abs(moved[2]) > p.fastest_rad_s * elapsed_s
+        return math.hypot(moved[0], moved[1]) > self._params.fastest_m_s * elapsed_s
 
     @staticmethod
     def doubt(moved: FloatArray) -> FloatArray:

@@ -55,15 +55,17 @@ class Rest:
         if self._gathers:
             self._passed[:3] = by_head @ self._passed[:HEAD]
 
-    def correct(self, seen: FloatArray, weight: FloatArray, off: FloatArray, gain: FloatArray, rows: IntArray) -> None:
+    def correct(
+        self, seen: FloatArray, weight: FloatArray | None, off: FloatArray, gain: FloatArray, rows: IntArray
+    ) -> None:
         """Gather an update.
 
         Parameters
         ----------
         seen : (k, r) array
             Derivative of what was measured by some values of the near state.
-        weight : (k, k) array
-            Inverse of the covariance of the innovation.
+        weight : (k, k) array or None
+            Inverse of the covariance of the innovation; None where nothing far away may learn from it.
         off : (k,) array
             The innovation.
         gain : (near, k) array
@@ -73,8 +75,9 @@ class Rest:
         if not self._gathers:
             return
         passed = seen @ self._passed[rows]
-        self._learnt += passed.T @ weight @ passed
-        self._shift += passed.T @ (weight @ off)
+        if weight is not None:
+            self._learnt += passed.T @ weight @ passed
+            self._shift += passed.T @ (weight @ off)
         self._passed -= gain @ passed
 
     def add(self, by_pose: FloatArray) -> None:

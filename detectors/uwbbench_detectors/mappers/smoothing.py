@@ -21,14 +21,16 @@ class Sightings:
     ----------
     node, landmark : (n,) int array
         From which pose which landmark was seen.
-    range_m, bearing_rad : (n,) array
-        From the robot's origin and its forward direction.
+    measured : (n, 2) array
+        Range in metres and bearing in radians, from the robot's origin and its forward direction.
+    sd : (n, 2) array
+        Standard deviations of both.
     """
 
     node: IntArray
     landmark: IntArray
-    range_m: FloatArray
-    bearing_rad: FloatArray
+    measured: FloatArray
+    sd: FloatArray
 
 
 @dataclass(frozen=True)
@@ -50,8 +52,6 @@ class Problem:
     scale_sd : (2,) array
         Standard deviations of the scale errors of distance and of turns, each one number a run.
     sightings : Sightings
-    sighting_sd : (2,) array
-        Standard deviations of range in metres and bearing in radians.
     huber : float
         Sightings count with their square up to so many standard deviations, beyond that in proportion.
     """
@@ -63,7 +63,6 @@ class Problem:
     noise: FloatArray
     scale_sd: FloatArray
     sightings: Sightings
-    sighting_sd: FloatArray
     huber: float
 
 
@@ -136,14 +135,14 @@ def smooth(problem: Problem) -> Solution:
         guess.insert(landmark(number), position_m)
     for node, step in enumerate(zip(problem.moved, problem.by_scales, problem.noise, strict=True)):
         graph.add(_motion(gtsam, (pose(node), pose(node + 1), scales), *step))
-    robust = gtsam.noiseModel.Robust.Create(
-        gtsam.noiseModel.mEstimator.Huber.Create(problem.huber), sigmas(problem.sighting_sd[::-1])
-    )
+    loss = gtsam.noiseModel.mEstimator.Huber.Create(problem.huber)
     seen = problem.sightings
-    for node, number, range_m, bearing in zip(
-        seen.node.tolist(), seen.landmark.tolist(), seen.range_m.tolist(), seen.bearing_rad.tolist(), strict=True
+    for node, number, measured, sd in zip(
+        seen.node.tolist(), seen.landmark.tolist(), seen.measured, seen.sd, strict=True
     ):
-        graph.add(gtsam.BearingRangeFactor2D(pose(node), landmark(number), gtsam.Rot2(bearing), range_m, robust))
+        noise = gtsam.noiseModel.Robust.Create(loss, sigmas(sd[::-1]))  # gtsam has the bearing first
+        bearing = gtsam.Rot2(measured[1])
+        graph.add(gtsam.BearingRangeFactor2D(pose(node), landmark(number), bearing, measured[0], noise))
     values = gtsam.LevenbergMarquardtOptimizer(graph, guess).optimize()
     marginals = gtsam.Marginals(graph, values)
     found = [values.atPose2(pose(node)) for node in range(len(problem.poses))]
@@ -179,7 +178,7 @@ def _motion(gtsam: Any, keys: tuple[int, int, int], moved: FloatArray, by_scales
     return gtsam.CustomFactor(gtsam.noiseModel.Gaussian.Covariance(noise), list(keys), error)
 
 
-def close_loops(problem: Problem, gate: float) -> tuple[Problem, Solution]:
+def close_loops(problem: Problem, gate: float) -> tuple[Solution, IntArray]:
     """Smooth, take landmarks for one that lie within the gate of each other, and smooth again, until none do.
 
     Two landmarks are one if each is the nearest of the other by their squared distance in standard deviations, of the
@@ -193,16 +192,20 @@ def close_loops(problem: Problem, gate: float) -> tuple[Problem, Solution]:
 
     Returns
     -------
-    (Problem, Solution)
+    Solution
         With the landmarks that are left.
+    (k,) int array
+        Which of them each landmark of the problem is.
     """
+    became = np.arange(len(problem.landmarks))
     while True:
         solution = smooth(problem)
-        name = _merged(solution, _together(problem.sightings, len(problem.landmarks)), gate)
+        seen = problem.sightings
+        name = _merged(solution, _together(seen, len(problem.landmarks)), gate)
         kept, number = np.unique(name, return_inverse=True)
         if len(kept) == len(name):
-            return problem, solution
-        seen = problem.sightings
+            return solution, became
+        became = number[became]
         problem = replace(
             problem,
             poses=np.concatenate([problem.poses[:1], solution.poses[1:]]),

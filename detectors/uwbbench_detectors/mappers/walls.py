@@ -23,6 +23,10 @@ class WallParams(Params):
     azimuth_deg: float = Field(50.0, gt=0, le=180, description="Largest azimuth to either side of the boresight.")
     range_sd_m: float = Field(0.08, gt=0, description="Standard deviation of the range of one echo.")
     azimuth_sd_deg: float = Field(10.0, gt=0, description="Standard deviation of the azimuth of one echo.")
+    shared_range_sd_m: float = Field(
+        0.04, ge=0, description="Standard deviation of what the ranges of a window are off alike."
+    )
+    shared_azimuth_sd_deg: float = Field(4.0, ge=0, description="The same for azimuths.")
     inlier_m: float = Field(
         0.15, gt=0, description="An echo belongs to a wall whose distance is this close to its range."
     )
@@ -51,6 +55,11 @@ class WallParams(Params):
     def spread(self) -> Spread:
         """Standard deviations of one echo."""
         return Spread(self.range_sd_m, np.radians(self.azimuth_sd_deg))
+
+    @property
+    def shared(self) -> Spread:
+        """Standard deviations of what the echoes of a wall have in common."""
+        return Spread(self.shared_range_sd_m, np.radians(self.shared_azimuth_sd_deg))
 
     @property
     def reach(self) -> Spread:
@@ -92,7 +101,7 @@ def settle_line(echoes: Echoes, members: BoolArray, line: FloatArray, params: Wa
     for _ in range(ROUNDS):
         if not members.any():
             return None
-        line, covariance = fit_line(echoes.take(members), params.spread, line)
+        line, covariance = fit_line(echoes.take(members), params.spread, params.shared, line)
         now = params.reach.squared(*echoes.off_line(line)) <= 1
         if np.array_equal(now, members):
             break

@@ -20,7 +20,7 @@ class WindowParams(Params):
     turn_rad: float = Field(1.5, gt=0, description="A window ends after as much turning too.")
     nearest_m: float = Field(0.5, ge=0, description="Smallest range.")
     farthest_m: float = Field(3.5, gt=0, description="Largest range.")
-    azimuth_deg: float = Field(50.0, gt=0, le=180, description="Largest azimuth to either side of the boresight.")
+    azimuth_deg: float = Field(75.0, gt=0, le=180, description="Largest azimuth to either side of the boresight.")
     eps_m: float = Field(0.15, gt=0, description="Neighbourhood radius of DBSCAN.")
     min_samples: int = Field(6, ge=1, description="Points in the neighbourhood of a core point, itself included.")
     standing_m: float = Field(

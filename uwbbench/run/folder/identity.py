@@ -87,8 +87,8 @@ def suite_version(captures: Mapping[tuple[str, str], str], rules: Any) -> str:
     return digest([sorted([*key, content] for key, content in captures.items()), rules])
 
 
-def capture_name(dataset: str, params: Mapping[str, Any], capture: str) -> str:
-    """Name of the files of a capture.
+def capture_name(dataset: str, params: Mapping[str, Any], capture: str, run: Sequence[str] = ()) -> str:
+    """Name of the files of a capture, or of a run.
 
     Parameters
     ----------
@@ -97,9 +97,12 @@ def capture_name(dataset: str, params: Mapping[str, Any], capture: str) -> str:
     params : mapping
         Its parameters as written.
     capture : str
-        Name of the capture in the dataset.
+        Name of the capture, or of the run, in the dataset.
+    run : sequence of str
+        Captures of the run.
     """
-    return file_id([dataset, params, capture])
+    several = {} if tuple(run) in ((), (capture,)) else {"run": list(run)}
+    return file_id([dataset, {**params, **several}, capture])
 
 
 def listing_name(dataset: str) -> str:

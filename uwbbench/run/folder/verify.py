@@ -200,7 +200,8 @@ class _Verifier:
     def _capture_name(self, entry: Entry) -> str:
         for used in self.manifest["experiment"]["datasets"]:
             if used["label"] == entry.dataset:
-                return capture_name(used["use"], used["params"], entry.capture)
+                runs = self.manifest.get("runs", {}).get(entry.dataset, {})
+                return capture_name(used["use"], used["params"], entry.capture, runs.get(entry.capture, ()))
         raise ValueError(f"the manifest has no dataset {_shown(entry.dataset)}")
 
     def _stability(self, entry: Entry) -> None:

@@ -20,9 +20,9 @@ def drives(content: Content) -> Section | None:
     if not content.drives:
         return None
     note = (
-        "Of each dataset the run that as many are better than as are worse. The start of each estimate lies on the true "
-        "one. Ellipses and bands are what a mapper states of its own errors. Path and echoes are those up to the chosen "
-        "time; cells, landmarks, points and lines are those at the end. Long runs are thinned."
+        "Of each dataset the run that as many are better than as are worse. The start of each estimate lies on the "
+        "true one. Ellipses and bands are what a mapper states of its own errors. Path and echoes are those up to the "
+        "chosen time; cells, landmarks, points and lines are those at the end. Long runs are thinned."
     )
     return Section("drives", "Maps and trajectories", layout="drives", notes=(note,))
 

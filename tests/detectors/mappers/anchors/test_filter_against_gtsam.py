@@ -88,10 +88,9 @@ def problem() -> Problem:
         sightings=Sightings(
             np.repeat(np.arange(NODES), len(POINTS_M)),
             np.tile(np.arange(len(POINTS_M)), NODES),
-            seen[..., 0].ravel(),
-            seen[..., 1].ravel(),
+            seen.reshape(-1, 2),
+            np.tile(np.sqrt(np.diag(NOISE)), (NODES * len(POINTS_M), 1)),
         ),
-        sighting_sd=np.sqrt(np.diag(NOISE)),
         huber=1.345,
     )
 
