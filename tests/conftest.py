@@ -16,6 +16,7 @@ pytest_plugins = [
     "tests.fixtures.shared",
     "tests.fixtures.compiling",
     "tests.fixtures.runs",
+    "tests.fixtures.drives",
     "tests.fixtures.contributions",
 ]
 
