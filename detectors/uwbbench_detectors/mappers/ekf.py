@@ -280,10 +280,19 @@ class Ekf:
         self._marks[kept].support += self._marks[dropped].support
         self.remove(dropped)
 
-    def landmarks(self, handles: list[int] | None = None) -> Landmarks:
-        """Some landmarks by their handles, near or far, or all of them."""
+    def landmarks(self, least_support: int = 1, handles: list[int] | None = None) -> Landmarks:
+        """Landmarks, near or far, by their handles.
+
+        Parameters
+        ----------
+        least_support : int
+            Observations that each is made of, at least.
+        handles : list of int, optional
+            All by default.
+        """
         self._settle()
-        kept = sorted(self._marks if handles is None else handles)
+        wanted = sorted(self._marks if handles is None else handles)
+        kept = [handle for handle in wanted if self._marks[handle].support >= least_support]
         if not kept:
             return Landmarks.none()
         marks = [self._marks[handle] for handle in kept]
