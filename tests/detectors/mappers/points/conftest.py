@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -67,7 +68,7 @@ def drifting(truth: np.ndarray, drift: float, seed: int) -> np.ndarray:
 def way(corners: np.ndarray) -> np.ndarray:
     """Poses (steps, 3) along straight lines between corners, turning on the spot."""
     poses = []
-    for start, end in zip(corners[:-1], corners[1:], strict=True):
+    for start, end in pairwise(corners):
         count = round(np.hypot(*(end - start)) / SPEED_M_S * RATE_HZ)
         along = start + (end - start) * np.arange(count)[:, None] / count
         poses.append(np.column_stack([along, np.full(count, np.arctan2(*(end - start)[::-1]))]))
