@@ -80,7 +80,7 @@ class SlamParticlesParams(Params):
     gate_sigmas: float = Field(3.0, gt=0, description="A range belongs to a landmark within these standard deviations.")
     beyond_m: float = Field(2.0, ge=0, description="By how far a wall may go on beyond where it was seen.")
     least_support: int = Field(8, ge=1, description="Readings that a landmark of the map is made of.")
-    motion: MotionParams = MotionParams()
+    motion: MotionParams = Field(MotionParams.model_validate({}), description="How odometry errs.")
     seed: int = Field(1, ge=0, description="Of all draws.")
 
 
