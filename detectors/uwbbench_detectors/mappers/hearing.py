@@ -18,26 +18,26 @@ class AnchorParams(Params):
     """How well anchors are placed and heard, and which messages are believed."""
 
     placed_sd_m: float = Field(
-        0.10, gt=0, description="Standard deviation, in each axis, of where the robot sets an anchor down."
+        default=0.10, gt=0, description="Standard deviation, in each axis, of where the robot sets an anchor down."
     )
-    azimuth_sd_deg: float = Field(5.0, gt=0, description="Standard deviation of the direction of a message.")
-    use_range: bool = Field(True, description="Whether distances of messages count, where they have any.")
-    range_sd_m: float = Field(0.10, gt=0, description="Standard deviation of the distance of a message.")
+    azimuth_sd_deg: float = Field(default=5.0, gt=0, description="Standard deviation of the direction of a message.")
+    use_range: bool = Field(default=True, description="Whether distances of messages count, where they have any.")
+    range_sd_m: float = Field(default=0.10, gt=0, description="Standard deviation of the distance of a message.")
     range_bias_m: float = Field(
-        0.18,
+        default=0.18,
         description="By how much distances are too long; 18 cm were measured on a link of two DW1000. It belongs to "
         "the radios and their antennas: measure it.",
     )
     azimuth_deg: float = Field(
-        45.0,
+        default=45.0,
         gt=0,
         le=90,
         description="Messages from farther off the boresight are not used: phases are ambiguous there.",
     )
-    nearest_m: float = Field(1.0, ge=0, description="Messages of anchors that should be nearer are not used,")
-    farthest_m: float = Field(10.0, gt=0, description="nor of those that should be farther away.")
+    nearest_m: float = Field(default=1.0, ge=0, description="Messages of anchors that should be nearer are not used,")
+    farthest_m: float = Field(default=10.0, gt=0, description="nor of those that should be farther away.")
     gate: float = Field(
-        0.99, gt=0, lt=1, description="Probability with which a message of the right anchor is within the gate."
+        default=0.99, gt=0, lt=1, description="Probability with which a message of the right anchor is within the gate."
     )
 
     @model_validator(mode="after")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,9 @@ from uwbbench_detectors.mappers.smoothing import Problem, Sightings, Solution
 
 LEAST_VARIANCE = 1e-10
 """Of a movement: that of a robot that stands still has none, which no factor can have."""
+
+LONGEST_M, LONGEST_RAD = 0.5, 0.5
+"""A leg that is longer than this, or turns more, ends in a node though nothing was seen there."""
 
 
 class Leg:
@@ -26,10 +30,13 @@ class Leg:
         Its derivatives by the scale errors.
     noise : (3, 3) array
         Its covariance without them.
+    way_m, turn_rad : float
+        How far it went and turned, whichever way.
     """
 
     def __init__(self) -> None:
         self.moved, self.by_scales, self.noise = np.zeros(3), np.zeros((3, 2)), np.zeros((3, 3))
+        self.way_m = self.turn_rad = 0.0
 
     def add(self, motion: Motion, moved: FloatArray) -> None:
         """Go on by a step (3,) of odometry."""
@@ -37,13 +44,15 @@ class Leg:
         by_pose = by_head[:, :3]
         self.by_scales = by_pose @ self.by_scales + by_head[:, 3:]
         self.noise = by_pose @ self.noise @ by_pose.T + noise
+        self.way_m += math.hypot(moved[0], moved[1])
+        self.turn_rad += abs(float(moved[2]))
 
 
 class Logbook(Ekf):
     """The filter, with a log of its odometry and of which landmark was seen when; memory grows with the run.
 
-    Steps in which a landmark is seen, the first and the last are *nodes*: poses that a graph asks for. The others hang
-    on the node before them.
+    Steps in which a landmark is seen, the first and the last, and some between those that are far apart are *nodes*:
+    poses that a graph asks for. The others hang on the node before them.
 
     Parameters
     ----------
@@ -159,7 +168,8 @@ class Logbook(Ekf):
         if self._index is None:
             return
         seen = bool(self._sightings) and self._sightings[-1][0] == len(self._nodes)
-        if seen or last or not self._nodes:
+        long = self._leg.way_m > LONGEST_M or self._leg.turn_rad > LONGEST_RAD
+        if seen or long or last or not self._nodes:
             if self._nodes:
                 self._legs.append(self._leg)
             self._nodes.append(self.pose)
@@ -181,4 +191,5 @@ def _after(poses: FloatArray, moved: FloatArray) -> FloatArray:
     """Poses (n, 3) after movements (n, 3) in their own frames; angles not wrapped."""
     cosine, sine = np.cos(poses[:, 2]), np.sin(poses[:, 2])
     forward, leftward, turned = moved.T
-    return poses + np.column_stack([cosine * forward - sine * leftward, sine * forward + cosine * leftward, turned])
+    ahead = np.column_stack([cosine * forward - sine * leftward, sine * forward + cosine * leftward, turned])
+    return np.asarray(poses + ahead)

@@ -97,7 +97,7 @@ class SlamLines(Mapper[SlamLinesParams]):
         walls = [handle for handle in self._feet if self._ekf.support(handle) >= self.params.least_support]
         if not walls:
             self.note("no wall was seen often enough to be one of the map")
-        marks = self._ekf.landmarks([*points.identity.tolist(), *walls])
+        marks = self._ekf.landmarks(handles=[*points.identity.tolist(), *walls])
         lines = marks.of("line")
         segments_m = [
             self._feet[number].segments_m(np.array([rho, alpha]))

@@ -45,11 +45,13 @@ class SlamPoints(Mapper[SlamPointsParams]):
 
     consumes: ClassVar[frozenset[str]] = ports("range_m", "azimuth_rad")
     fidelity = "reconstruction"
+    filter: ClassVar[type[Ekf]] = Ekf
+    """What the mapper is made of; a mapper that looks back has one that keeps a log."""
 
     def open(self, radars: Mapping[str, Radar], start: Poses) -> None:
         """Begin where odometry begins, with an empty map."""
         super().open(radars, start)
-        self.ekf = Ekf(start.pose[0], self.params.motion)
+        self.ekf = self.filter(start.pose[0], self.params.motion)
         self._reckoning = Reckoning(self.ekf, self.note)
         self.points = Points(self.params, self.ekf, radars)
 

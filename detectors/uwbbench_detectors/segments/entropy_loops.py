@@ -8,6 +8,7 @@ import numpy as np
 
 from uwbbench.api import FloatArray, IntArray, compiled
 from uwbbench_detectors.cfar.windows import window_sums
+from uwbbench_detectors.compiled.rank import median, sort
 
 GAUSS, VASICEK = range(2)
 """Codes of the estimators."""
@@ -47,22 +48,14 @@ def entropies(
         return
     ordered = scratch[0, :window]
     for first in range(len(entropy)):
-        ordered[:] = amplitude[first : first + window]
-        ordered.sort()
+        for place in range(window):
+            ordered[place] = amplitude[first + place]
+        sort(ordered)
         total = 0.0
         for rank in range(window):
             gap = ordered[min(rank + spacing, window - 1)] - ordered[max(rank - spacing, 0)]
             total += math.log(window / (2 * spacing) * gap)
         entropy[first] = total / window
-
-
-@compiled
-def _median(values: FloatArray) -> float:
-    """Median of values, which are sorted in place."""
-    values.sort()
-    half = len(values) // 2
-    middle: float = values[half] if len(values) % 2 else (values[half - 1] + values[half]) / 2
-    return middle
 
 
 @compiled
@@ -117,11 +110,12 @@ def segments(
         for tap in range(taps):  # so that no square over- or underflows
             level[tap] = amplitude[frame, tap] / unit
         entropies(level, window, spacing, kind, scratch, entropy)
-        reference[:] = entropy[windows - tail :]
-        centre = _median(reference)
+        for place in range(tail):
+            reference[place] = entropy[windows - tail + place]
+        centre = median(reference)
         for place in range(tail):
             reference[place] = abs(entropy[windows - tail + place] - centre)
-        spread = _median(reference)
+        spread = median(reference)
         if not (spread > 0 and math.isfinite(centre)):
             silent = True
             continue

@@ -10,7 +10,7 @@ import pytest
 from uwbbench.api import Detections, FloatArray, Messages, Radar, Step, wrap_angle
 from uwbbench.api.drive import relative
 
-STEP_M = 0.05
+STEP_M = 0.1
 LENGTH_M = 20.0
 
 
@@ -28,20 +28,22 @@ class Setting:
     azimuth_sd_deg: float = 5.0
     range_sd_m: float = 0.10
     range_bias_m: float = 0.18
-    every: int = 5
+    every: int = 2
     wrong_identity: float = 0.0
+    rods: int = 0
     mount: tuple[float, float, float] = (0.0, 0.125, 0.0)
     field_of_view_deg: float = 45.0
 
 
 @dataclass(frozen=True)
 class Corridor:
-    """True poses and odometry (n, 3) of a drive, its steps, and where its anchors stand."""
+    """True poses and odometry (n, 3) of a drive, its steps, where its anchors stand, and messages with a wrong name."""
 
     truth: FloatArray
     odometry: FloatArray
     steps: list[Step]
     anchors: dict[int, FloatArray] = field(default_factory=dict)
+    wrong: int = 0
 
 
 def build_radars(**mounts: tuple[float, float, float]) -> dict[str, Radar]:
@@ -54,7 +56,8 @@ def build_radars(**mounts: tuple[float, float, float]) -> dict[str, Radar]:
 
 def drive(setting: Setting) -> Corridor:
     """Out along x, a turn on the spot, and back; anchors are set down at equal distances on the way out."""
-    rng = np.random.default_rng(setting.seed)
+    rng, sight = np.random.default_rng(setting.seed), np.random.default_rng(setting.seed + 1)
+    rods = np.column_stack([setting.length_m * sight.random(setting.rods), 3 * sight.random(setting.rods) - 1.5])
     out = np.arange(0.0, setting.length_m + 1e-9, STEP_M)
     x = np.concatenate([out, out[::-1]])
     truth = np.column_stack([x, np.zeros_like(x), np.repeat([0.0, np.pi], len(out))])
@@ -65,7 +68,7 @@ def drive(setting: Setting) -> Corridor:
     moved[:, 2] *= 1 + setting.rotation_error * rng.standard_normal()
     moved[:, 2] += np.radians(setting.heading_sd_deg) * np.sqrt(way) * rng.standard_normal(len(way))
     places: dict[int, FloatArray] = {}
-    odometry, steps = np.zeros_like(truth), []
+    odometry, steps, wrong = np.zeros_like(truth), list[Step](), 0
     for index, pose in enumerate(truth):
         if index:
             odometry[index] = _after(odometry[index - 1], moved[index])
@@ -79,16 +82,18 @@ def drive(setting: Setting) -> Corridor:
             away = offset - setting.mount[:2]
             rows.append((100 + len(places), np.arctan2(away[1], away[0]) - setting.mount[2], np.hypot(*away), True))
         if index % setting.every == 0:
-            rows += _heard(places, _after(pose, np.array(setting.mount)), setting, rng)
+            heard, misnamed = _heard(places, _after(pose, np.array(setting.mount)), setting, rng)
+            rows, wrong = rows + heard, wrong + misnamed
+        found = {"front": _seen(index, rods, _after(pose, np.array(setting.mount)), sight)}
         messages = {"front": _messages(rows)} if rows else {}
-        steps.append(Step(index, index / 10.0, moved[index], {"front": _nothing(index)}, messages))
-    return Corridor(truth, odometry, steps, places)
+        steps.append(Step(index, index / 5.0, moved[index], found, messages))
+    return Corridor(truth, odometry, steps, places, wrong)
 
 
 def _heard(
     places: dict[int, FloatArray], receiver: FloatArray, setting: Setting, rng: np.random.Generator
-) -> list[Any]:
-    rows = []
+) -> tuple[list[Any], int]:
+    rows, wrong = [], 0
     for name, place in places.items():
         away = place - receiver[:2]
         range_m = np.hypot(*away)
@@ -96,12 +101,13 @@ def _heard(
         if 1.0 <= range_m <= 10.0 and abs(azimuth) <= np.radians(setting.field_of_view_deg):
             said = name
             if rng.random() < setting.wrong_identity:
+                wrong += 1
                 said = int(rng.choice([other for other in places if other != name] or [name + 1]))
             measured = azimuth + np.radians(setting.azimuth_sd_deg) * rng.standard_normal()
             rows.append(
                 (said, measured, range_m + setting.range_bias_m + setting.range_sd_m * rng.standard_normal(), False)
             )
-    return rows
+    return rows, wrong
 
 
 def _messages(rows: list[Any]) -> Messages:
@@ -109,8 +115,14 @@ def _messages(rows: list[Any]) -> Messages:
     return Messages(np.array(anchor), np.array(azimuth), np.array(range_m), np.array(placed))
 
 
-def _nothing(index: int) -> Detections:
-    return Detections(np.zeros(0, np.int64), range_m=np.zeros(0), azimuth_rad=np.zeros(0))
+def _seen(index: int, rods: FloatArray, receiver: FloatArray, rng: np.random.Generator) -> Detections:
+    away = rods - receiver[:2]
+    range_m = np.hypot(*away.T)
+    azimuth = wrap_angle(np.arctan2(away[:, 1], away[:, 0]) - receiver[2])
+    near = (range_m < 3.5) & (np.abs(azimuth) < np.radians(50.0))
+    noise = np.array([[0.03], [np.radians(3.0)]]) * rng.standard_normal((2, int(near.sum())))
+    rows = np.full(int(near.sum()), index)
+    return Detections(rows, range_m=range_m[near] + noise[0], azimuth_rad=azimuth[near] + noise[1])
 
 
 def _after(pose: FloatArray, moved: FloatArray) -> FloatArray:
@@ -119,13 +131,13 @@ def _after(pose: FloatArray, moved: FloatArray) -> FloatArray:
     return np.array([pose[0] + x, pose[1] + y, wrap_angle(pose[2] + moved[2])])
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def corridor() -> Callable[..., Corridor]:
     """``drive`` with changes of a :class:`Setting`."""
     return lambda **changes: drive(Setting(**changes))
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def radars() -> Callable[..., dict[str, Radar]]:
     """``build_radars``."""
     return build_radars
