@@ -39,7 +39,17 @@ def main(folder: Path) -> None:
     walk.main(folder)
     slam.main(folder)
     subprocess.run([sys.executable, HERE / "segments.py"], check=True)  # noqa: S603 - our own
-    names = ("radargram", "map", "stable-zone", "coupling", "still-robot", "walker-svd", "kalman-track", "slam-points")
+    names = (
+        "radargram",
+        "map",
+        "stable-zone",
+        "coupling",
+        "still-robot",
+        "walker-svd",
+        "kalman-track",
+        "slam-points",
+        "slam-lines",
+    )
     for name in (f"{name}.png" for name in names):
         shrink(folder / name, IMAGES / name)
     (IMAGES / "examples").mkdir(exist_ok=True)
