@@ -42,7 +42,7 @@ def main(folder: Path) -> None:
     loops.main(folder)
     subprocess.run([sys.executable, HERE / "segments.py"], check=True)  # noqa: S603 - our own
     names = ("radargram", "map", "stable-zone", "coupling", "still-robot", "walker-svd", "kalman-track")
-    names += ("slam-points", "slam-anchors", "slam-graph")
+    names += ("slam-points", "slam-lines", "slam-anchors", "slam-graph")
     for name in (f"{name}.png" for name in names):
         shrink(folder / name, IMAGES / name)
     (IMAGES / "examples").mkdir(exist_ok=True)
