@@ -7,6 +7,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import bat_room
 import coupling
 import still_robot
 import walk
@@ -36,8 +37,18 @@ def main(folder: Path) -> None:
     coupling.main(folder / "coupling.png")
     still_robot.main(folder / "still-robot.png")
     walk.main(folder)
+    bat_room.main(folder)
     subprocess.run([sys.executable, HERE / "segments.py"], check=True)  # noqa: S603 - our own
-    names = ("radargram", "map", "stable-zone", "coupling", "still-robot", "walker-svd", "kalman-track")
+    names = (
+        "radargram",
+        "map",
+        "stable-zone",
+        "coupling",
+        "still-robot",
+        "walker-svd",
+        "kalman-track",
+        "slam-particles",
+    )
     for name in (f"{name}.png" for name in names):
         shrink(folder / name, IMAGES / name)
     (IMAGES / "examples").mkdir(exist_ok=True)
