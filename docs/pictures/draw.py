@@ -9,6 +9,8 @@ from pathlib import Path
 
 import bat_room
 import coupling
+import loops
+import slam
 import still_robot
 import walk
 from PIL import Image
@@ -38,17 +40,11 @@ def main(folder: Path) -> None:
     still_robot.main(folder / "still-robot.png")
     walk.main(folder)
     bat_room.main(folder)
+    slam.main(folder)
+    loops.main(folder)
     subprocess.run([sys.executable, HERE / "segments.py"], check=True)  # noqa: S603 - our own
-    names = (
-        "radargram",
-        "map",
-        "stable-zone",
-        "coupling",
-        "still-robot",
-        "walker-svd",
-        "kalman-track",
-        "slam-particles",
-    )
+    names = ("radargram", "map", "stable-zone", "coupling", "still-robot", "walker-svd", "kalman-track")
+    names += ("slam-particles", "slam-points", "slam-anchors", "slam-graph")
     for name in (f"{name}.png" for name in names):
         shrink(folder / name, IMAGES / name)
     (IMAGES / "examples").mkdir(exist_ok=True)

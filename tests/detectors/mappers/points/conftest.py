@@ -1,6 +1,5 @@
 """A robot on a way past rods, seen and counted without a simulator."""
 
-import itertools
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from itertools import pairwise
@@ -69,11 +68,7 @@ def drifting(truth: np.ndarray, drift: float, seed: int) -> np.ndarray:
 def way(corners: np.ndarray) -> np.ndarray:
     """Poses (steps, 3) along straight lines between corners, turning on the spot."""
     poses = []
-<<<<<<< HEAD
-    for start, end in itertools.pairwise(corners):
-=======
     for start, end in pairwise(corners):
->>>>>>> points
         count = round(np.hypot(*(end - start)) / SPEED_M_S * RATE_HZ)
         along = start + (end - start) * np.arange(count)[:, None] / count
         poses.append(np.column_stack([along, np.full(count, np.arctan2(*(end - start)[::-1]))]))

@@ -51,11 +51,7 @@ def test_linear_filter_equals_least_squares_over_the_whole_run():
     position = np.zeros(2)
     for step in range(steps):
         length = rng.uniform(0.5, 1.5)
-<<<<<<< HEAD
-        position = (*position, length, 0, *rng.normal(0, sd_m, 2))
-=======
         position = position + np.array([length, 0.0]) + rng.normal(0, sd_m, 2)
->>>>>>> points
         ekf.predict(np.array([length, 0.0, 0.0]))
         here, before = [2 * step, 2 * step + 1], [2 * step - 2, 2 * step - 1]
         moved = length * np.diag([sd_m**2, 4 * sd_m**2])
