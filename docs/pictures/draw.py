@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 
 import coupling
+import loops
 import slam
 import still_robot
 import walk
@@ -38,18 +39,10 @@ def main(folder: Path) -> None:
     still_robot.main(folder / "still-robot.png")
     walk.main(folder)
     slam.main(folder)
+    loops.main(folder)
     subprocess.run([sys.executable, HERE / "segments.py"], check=True)  # noqa: S603 - our own
-    names = (
-        "radargram",
-        "map",
-        "stable-zone",
-        "coupling",
-        "still-robot",
-        "walker-svd",
-        "kalman-track",
-        "slam-points",
-        "slam-lines",
-    )
+    names = ("radargram", "map", "stable-zone", "coupling", "still-robot", "walker-svd", "kalman-track")
+    names += ("slam-points", "slam-lines", "slam-anchors", "slam-graph")
     for name in (f"{name}.png" for name in names):
         shrink(folder / name, IMAGES / name)
     (IMAGES / "examples").mkdir(exist_ok=True)

@@ -13,6 +13,9 @@ from uwbbench.api import FloatArray, Messages, Params, Radar
 from uwbbench_detectors.mappers.anchor import AZIMUTH, CLOSEST_M, RANGE, AnchorModel
 from uwbbench_detectors.mappers.ekf import Ekf
 
+FEW_SIGMAS = 4.0
+"""More messages outside the gate than chance would put there, by so many standard deviations, are worth a note."""
+
 
 class AnchorParams(Params):
     """How well anchors are placed and heard, and which messages are believed."""
@@ -105,8 +108,9 @@ class Hearing:
     def notes(self) -> list[str]:
         """What a reader of the results must know."""
         notes = []
-        if self._rejected:
-            rejected = sum(self._rejected.values())
+        rejected = sum(self._rejected.values())
+        by_chance = (1 - self._params.gate) * (rejected + self._used)
+        if rejected > by_chance + FEW_SIGMAS * math.sqrt(by_chance):
             each = ", ".join(f"{count} of anchor {anchor}" for anchor, count in sorted(self._rejected.items()))
             notes.append(f"{rejected} of {rejected + self._used} messages of anchors lay outside the gate: {each}")
         strangers = sorted(self._strangers)

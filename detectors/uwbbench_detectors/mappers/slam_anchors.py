@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import ClassVar
 
 import numpy as np
+from pydantic import Field
 
 from uwbbench.api import Landmarks, Map, Params, Poses, Radar, Step
 from uwbbench_detectors.mappers.hearing import AnchorParams, Hearing
@@ -15,7 +16,7 @@ from uwbbench_detectors.mappers.slam_points import SlamPoints, SlamPointsParams
 class SlamAnchorsParams(SlamPointsParams):
     """Those of ``slam.points``, and how anchors are heard."""
 
-    anchors: AnchorParams = AnchorParams()
+    anchors: AnchorParams = Field(AnchorParams.model_validate({}), description="How anchors are placed and heard.")
 
 
 class SlamAnchors(SlamPoints):
@@ -24,6 +25,9 @@ class SlamAnchors(SlamPoints):
     Where there is nothing to see the robot sets down a radio of known identity, and hears from which direction, and
     from how far, its messages come when it returns. The anchor stands in the frame of the map as well as the pose was
     known when it was set down; hearing it again closes the loop, and tells how much odometry is short of.
+
+    In kind after arXiv 2507.15474 (2025), of which the abstract is known; which messages count, and how much, is chosen
+    here.
     """
 
     needs: ClassVar[frozenset[str]] = frozenset(("anchors",))

@@ -91,6 +91,14 @@ def test_wrong_identity_is_rejected_and_counted(build: Build) -> None:
     assert hearing.notes == ["1 of 1 messages of anchors lay outside the gate: 1 of anchor 7"]
 
 
+def test_rejections_that_chance_explains_are_not_noted(build: Build) -> None:
+    hearing, ekf = build()
+    for _ in range(200):
+        hearing.take_in(ekf, {"front": said(7, np.arctan2(1.0, 4.0), np.hypot(4.0, 1.0) + 0.18)})
+    hearing.take_in(ekf, {"front": said(7, -0.5, 4.0)})
+    assert hearing.notes == []
+
+
 def test_anchor_that_was_never_set_down_is_not_used_and_named(build: Build) -> None:
     hearing, ekf = build()
     hearing.take_in(ekf, {"front": said(9, 0.0, 4.0)})
