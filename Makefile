@@ -13,6 +13,8 @@ $(VENV)/ready: pyproject.toml
 
 # Tests start many processes, which need not compile what they import each time anew: bytecode is kept.
 test test-slow: export PYTHONDONTWRITEBYTECODE =
+# Two workers share the cores already: threads over small matrices only wait for each other.
+test test-slow: export OPENBLAS_NUM_THREADS = 1
 
 # The files in their order, not those of the most tests first: those of few tests are often the longest.
 PYTEST := $(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder

@@ -1,5 +1,6 @@
 """Captures that many tests share."""
 
+import gc
 import importlib
 import os
 import sys
@@ -16,6 +17,7 @@ pytest_plugins = [
     "tests.fixtures.shared",
     "tests.fixtures.compiling",
     "tests.fixtures.runs",
+    "tests.fixtures.drives",
     "tests.fixtures.contributions",
 ]
 
@@ -38,6 +40,9 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         return 0 if path == _COMPILES_ALL else 1 if path.startswith(_COMPILE_LITTLE) else 2
 
     items.sort(key=place)
+    # What is here by now stays, and need not be looked through for garbage again and again.
+    gc.collect()
+    gc.freeze()
 
 
 _DATA = Path(os.environ.get("UWBBENCH_DATA", Path(__file__).parents[2] / "shared" / "data"))

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import coupling
 import loops
+import slam
 import still_robot
 import walk
 from PIL import Image
@@ -20,7 +21,7 @@ WIDTH = 1200
 
 
 def main(folder: Path) -> None:
-    """Run the experiment and draw everything; ``folder`` is emptied first."""
+    """Run the experiment and draw everything, for which the extra ``slam`` is needed; ``folder`` is emptied first."""
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
     for words in (
@@ -37,9 +38,10 @@ def main(folder: Path) -> None:
     coupling.main(folder / "coupling.png")
     still_robot.main(folder / "still-robot.png")
     walk.main(folder)
+    slam.main(folder)
     loops.main(folder)
     subprocess.run([sys.executable, HERE / "segments.py"], check=True)  # noqa: S603 - our own
-    names = ("radargram", "map", "stable-zone", "coupling", "still-robot", "walker-svd", "kalman-track")
+    names = ("radargram", "map", "stable-zone", "coupling", "still-robot", "walker-svd", "kalman-track", "slam-points")
     names += ("slam-anchors", "slam-graph")
     for name in (f"{name}.png" for name in names):
         shrink(folder / name, IMAGES / name)

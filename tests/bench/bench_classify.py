@@ -1,4 +1,4 @@
-"""Classifying frames by trees, one frame a call as in a stream, against scikit-learn with the same trees.
+"""Classifying frames by trees and by networks, one a call as in a stream; trees against scikit-learn with the same.
 
 Run through ``python tests/bench/run.py classify``. The trees are grown as those of ``coupling-extra-trees``, on labels
 that mean nothing: what a walk costs hangs on their depth.
@@ -58,4 +58,27 @@ def rows(effort: Effort) -> list[Row]:
         at_least(
             "... against scikit-learn, features not included", 100, ratio(seconds["scikit-learn"], seconds["stage"])
         ),
+        *networks(effort),
     ]
+
+
+def networks(effort: Effort) -> list[Row]:
+    """One frame a call through the recurrent networks as they are shipped, one way along the taps and both ways."""
+    calls = {name: _network(name, effort.frames(200)) for name in ("dwt-lstm", "dwt-bilstm")}
+    seconds = interleaved({name: call for name, (call, _) in calls.items()}, effort.rounds(9))
+    return [
+        at_most(f"{name}: network over one frame in a stream", 1.0, median(seconds[name] / calls[name][1] * 1e3), "ms")
+        for name in calls
+    ]
+
+
+def _network(name: str, count: int) -> tuple[Callable[[], Run], int]:
+    """Steps over single frames, and how many they are."""
+    detector = load_detector(name)
+    step = next(one for one in detector.config.steps if one.use == "classify.lstm")
+    capture = made.approach(count, sts=False)
+    block = Block.join(list(detector.arriving(capture, step.label)))
+    network = load_plugin("stages", step.use)
+    stage: Any = next(one for one in detector.open(capture).stages if isinstance(one, network))  # with its weights
+    alone = [block.cut(place, place + 1) for place in range(count)]
+    return lambda: lambda: [stage.step(one) for one in alone], count

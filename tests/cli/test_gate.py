@@ -255,3 +255,15 @@ def test_a_capture_without_truth_can_be_timed_and_not_scored(uwbbench, make_gate
     uwbbench("gate", "gate.yaml")
     make_gate(datasets=None, captures=captures, accuracy="[{metric: f1, scoring: frame, minimum: 0.5}]")
     assert "has no ground truth" in uwbbench("gate", "gate.yaml", code=3).stdout
+
+
+@pytest.mark.slow  # simulates two runs of two receivers
+def test_a_mapper_is_gated_on_runs(make_gate, uwbbench) -> None:
+    way = "set: {trajectory.points_m: [[0.0, 0.0], [0.3, 0.0]]}"
+    dataset = f"{{use: simulated, captures: ['*/drift-0.02/*'], params: {{scenes: [rods-loop-walls], runs: 1, {way}}}}}"
+    limits = "[{metric: ate, scoring: pose, maximum: 0.1}, {metric: f1, scoring: object, minimum: 0.5}]"
+    make_gate(head="map-occupancy", datasets=f"[{dataset}]", accuracy=limits)
+    told = json.loads(uwbbench("gate", "gate.yaml", "--json", code=3).stdout)
+    made = {check["name"]: (check["verdict"], check["counted"]) for check in told["checks"]}
+    assert made["ATE (pose scoring, filtering) on simulated, SIMULATED"] == ("pass", "runs in 1 groups")
+    assert made["accuracy of f1 (object scoring) on simulated"][0] == "invalid"

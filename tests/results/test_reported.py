@@ -21,9 +21,17 @@ reported:
 pipeline: [{use: peaks}, {use: range}]
 """
 
+FINDS_NOTHING = """\
+schema: 1
+name: finds-nothing
+reported:
+  - {figures: "precision 99 %", of: its own hall, source: "Somebody, 2020", metrics: [precision]}
+pipeline: [{use: peaks}, {use: filter.width, params: {minimum: 1000.0}}, {use: range}]
+"""
+
 EXPERIMENT = """\
 schema: 1
-detectors: [after-source.yaml, "null"]
+detectors: [after-source.yaml, finds-nothing.yaml, "null"]
 datasets: [{use: approach, name: plate, params: {speed_m_s: 6.0, runs: 1}, repeats: []}]
 scoring: frame
 latency: false
@@ -35,6 +43,7 @@ stability: false
 def report(tmp_path_factory: pytest.TempPathFactory) -> Report:
     folder = tmp_path_factory.mktemp("reported")
     (folder / "after-source.yaml").write_text(DETECTOR)
+    (folder / "finds-nothing.yaml").write_text(FINDS_NOTHING)
     (folder / "one.yaml").write_text(EXPERIMENT)
     run_experiment(read_experiment(folder / "one.yaml"), folder / "run", jobs=1)
     return Report(RunFolder(folder / "run"))
@@ -42,12 +51,17 @@ def report(tmp_path_factory: pytest.TempPathFactory) -> Report:
 
 def test_a_figure_with_a_like_metric_is_shown_beside_every_board_that_has_it(report: Report) -> None:
     (sheet,) = Tables(report).reported()
-    like, other = sheet.rows
+    like, other, _ = sheet.rows
     assert like[:4] == ("after-source", "F1 <b>99</b> %", "its own hall", "Somebody, 2020")
     assert like[4].startswith("SIMULATED: F1 ")
     assert like[5:] == ("plate", "frame", "1")
     assert other[4] == "no like metric"
     assert "no target" in sheet.notes[0]
+
+
+def test_a_board_on_which_the_metric_has_no_value_is_not_shown(report: Report) -> None:
+    (sheet,) = Tables(report).reported()
+    assert [row[4] for row in sheet.rows if row[0] == "finds-nothing"] == ["no like metric"]
 
 
 def test_figures_of_a_source_are_no_part_of_the_detector(tmp_path: Path) -> None:

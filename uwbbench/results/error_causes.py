@@ -19,6 +19,7 @@ from typing import Any, Literal
 import numpy as np
 
 from uwbbench.measure.accuracy.metrics.detection import F1
+from uwbbench.measure.accuracy.rules import has_causes
 from uwbbench.results.results import Scored
 from uwbbench.results.slices import Board
 from uwbbench.run.folder.scored import causes_of
@@ -118,6 +119,12 @@ def error_causes(scored: Sequence[Scored]) -> list[ErrorCauses]:
     for one in scored:
         groups[(one.dataset, one.source, one.scoring, one.table), one.detector].append(one)
     return [made for (board, detector), members in groups.items() for made in _pooled(board, detector, members)]
+
+
+def causes_lack(scored: Sequence[Scored]) -> bool:
+    """Whether errors could have causes, and none is stored."""
+    able = [one for one in scored if has_causes(one.scoring)]
+    return bool(able) and all(causes_of(one.numbers) is None for one in able)
 
 
 def _pooled(board: Board, detector: str, members: Sequence[Scored]) -> Iterator[ErrorCauses]:

@@ -31,7 +31,7 @@ from uwbbench.measure.accuracy.scoring import column_of
 from uwbbench.measure.accuracy.stats import Estimate
 from uwbbench.results import published
 from uwbbench.results.chains import chains_of
-from uwbbench.results.error_causes import ErrorCauses, error_causes
+from uwbbench.results.error_causes import ErrorCauses, causes_lack, error_causes
 from uwbbench.results.limits import Limits
 from uwbbench.results.pareto import speeds_of_run
 from uwbbench.results.ranked_curves import CurveKey, RankedCurve, curves_of
@@ -355,7 +355,7 @@ class Report:
             for note in entry.facts["notes"]:
                 counts[f"{entry.detector}: {note}"] += 1
         said = [f"{note} ({count} captures)" if count > 1 else note for note, count in counts.items()]
-        older = [EARLIER] if self.scored and not self.causes else []
+        older = [EARLIER] if causes_lack(self.scored) else []
         return said + older + list(self.metrics.notes) + self.folder.damage
 
     def to_dict(self) -> dict[str, Any]:

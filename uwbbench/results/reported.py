@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -22,8 +23,8 @@ class Reported:
     figures, of, source : str
         As the detector's file has them.
     board : mapping
-        ``dataset``, ``source`` (measured or simulated), ``scoring`` and ``captures``; empty where no board has any of
-        the metrics.
+        ``dataset``, ``source`` (measured or simulated), ``scoring`` and ``captures``; empty where no board has a value
+        of any of the metrics.
     here : dict of str to Estimate
         By metric.
     """
@@ -43,7 +44,7 @@ class Reported:
 
 
 def reported(report: Report) -> Iterator[Reported]:
-    """Every figure that a source reports of a detector of the run, once for each board that has a like metric.
+    """Every figure that a source reports of a detector of the run, once for each board with a value of a like metric.
 
     Parameters
     ----------
@@ -58,6 +59,11 @@ def reported(report: Report) -> Iterator[Reported]:
                 for row, estimates in report.estimates
                 if row["detector"] == detector
                 and row["table"] == "filtering"
-                and (here := {name: estimates[name] for name in one["metrics"] if name in estimates})
+                and (here := _defined(estimates, one["metrics"]))
             ]
             yield from boards or [Reported(*about, {}, {})]
+
+
+def _defined(estimates: Mapping[str, Estimate], metrics: list[str]) -> dict[str, Estimate]:
+    """Estimates of some metrics: those that have a value, as an error has none where nothing was to be found."""
+    return {name: estimates[name] for name in metrics if name in estimates and not math.isnan(estimates[name].value)}

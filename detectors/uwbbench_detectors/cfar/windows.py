@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from uwbbench.api import FloatArray, IntArray, compiled
+from uwbbench_detectors.compiled.rank import smallest
 
 CA, GO, SO, OS = range(4)
 """Codes of the statistics."""
@@ -82,8 +83,9 @@ def estimate_by_mean(
     for window in range(cells - half + 1):
         mean[window] /= half
     # The window that starts at cell w lies right of cell w - beyond and left of cell w + edge.
-    noise[:edge] = mean[beyond : beyond + edge]
-    noise[cells - edge :] = mean[cells - 2 * edge : cells - edge]
+    for cell in range(edge):
+        noise[cell] = mean[beyond + cell]
+        noise[cells - edge + cell] = mean[cells - 2 * edge + cell]
     inner, right = noise[edge : cells - edge], mean[edge + beyond :]
     if statistic == CA:
         for cell in range(len(inner)):
@@ -153,7 +155,7 @@ def estimate_by_rank(
         noise[cell] = np.inf
         if below[cell] < place:
             continue
-        count = 0
+        count = 0 * cell
         if cell >= edge:
             count = _gather(power[cell - edge : cell - guard], factor[cell], power[cell], scratch, count)
         if cell < last:
@@ -210,13 +212,11 @@ def estimate_by_rank_at(
     right = power[cell + guard + 1 : cell + guard + 1 + half] if cell < last else power[:0]
     place = places[1] if edge <= cell < last else places[0]
     height = power[cell]
-    count = _collect(right, factor, height, scratch, _collect(left, factor, height, scratch, 0))
+    none = 0 * cell  # what is called with a plain 0 is compiled for it alone
+    count = _collect(right, factor, height, scratch, _collect(left, factor, height, scratch, none))
     if count < place:
         return np.inf
-    exceeded = scratch[:count]
-    exceeded.sort()
-    least: float = exceeded[place - 1]
-    return least
+    return smallest(scratch[:count], place - 1)
 
 
 @compiled
@@ -237,6 +237,17 @@ def is_crest(amplitude: FloatArray, tap: int, reach: int) -> bool:
         if not higher:  # nor beside NaN
             return False
     return True
+
+
+@compiled
+def _copies(
+    rows: IntArray, tested: IntArray, score_db: FloatArray, count: int, room: int
+) -> tuple[IntArray, IntArray, FloatArray]:
+    """The first cells found, in arrays with room for so many."""
+    row, tap, score = np.empty(room, np.int64), np.empty(room, np.int64), np.empty(room)
+    for place in range(count):
+        row[place], tap[place], score[place] = rows[place], tested[place], score_db[place]
+    return row, tap, score
 
 
 @compiled
@@ -286,7 +297,7 @@ def detect(
     scratch, below = np.empty((3, cells)), np.empty(cells, np.int64)
     rows, tested = np.empty(frames + 16, np.int64), np.empty(frames + 16, np.int64)
     score_db = np.empty(frames + 16)
-    count, silent = 0, False
+    count, silent = 0 * frames, False  # what is called with a plain 0 is compiled for it alone
     for frame in range(frames):
         heights = amplitude[frame]
         for cell in range(cells):
@@ -309,14 +320,12 @@ def detect(
             if reach and not is_crest(heights, start + cell, reach):
                 continue
             if count == len(rows):
-                more = np.empty(count, np.int64)
-                rows, tested = np.concatenate((rows, more)), np.concatenate((tested, more))
-                score_db = np.concatenate((score_db, np.empty(count)))
+                rows, tested, score_db = _copies(rows, tested, score_db, count, 2 * count)
             rows[count], tested[count] = frame, start + cell
             score_db[count] = 10 * (math.log10(power[cell]) - math.log10(noise[cell]))
             count += 1
-    rows, tested = rows[:count].copy(), tested[:count].copy()
+    rows, tested, score_db = _copies(rows, tested, score_db, count, count)
     magnitude = np.empty(count)
     for place in range(count):
         magnitude[place] = amplitude[rows[place], tested[place]]
-    return rows, tested, magnitude, score_db[:count].copy(), silent
+    return rows, tested, magnitude, score_db, silent

@@ -9,6 +9,7 @@ import numpy as np
 from uwbbench.api import FloatArray, IntArray, compiled
 from uwbbench_detectors.clusters.grid import NONE, UNNUMBERED, Grid, Radius, root_of
 from uwbbench_detectors.clusters.incremental import IncrementalDbscan, dbscan, insert, root_of_border
+from uwbbench_detectors.compiled.rank import sort
 
 
 class Decided(NamedTuple):
@@ -154,7 +155,7 @@ def _rounds(
         end = min(start + every, stop)
         insert(grid, start, end, radius, min_samples)
         queue = grid.queue[: grid.used[2]]
-        queue.sort()
+        sort(queue)
         for point in queue:
             if grid.points[point].count >= min_samples:
                 root = root_of(grid.parent, grid.points[point].cell)

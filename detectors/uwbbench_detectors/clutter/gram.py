@@ -50,7 +50,9 @@ def _orthonormalize(vectors: ComplexArray) -> None:
         for _ in range(2):
             for earlier in range(row):
                 _add_scaled(vectors[row], vectors[earlier], -_product(vectors[earlier], vectors[row]))
-            vectors[row] /= np.sqrt(_product(vectors[row], vectors[row]).real)
+            scale = 1 / np.sqrt(_product(vectors[row], vectors[row]).real)
+            for place in range(len(vectors[row])):
+                vectors[row, place] *= scale
 
 
 @compiled
@@ -76,11 +78,18 @@ def _damp(gram: ComplexArray, basis: ComplexArray, image: ComplexArray, rest: fl
     image : (rank, frames) array
         The matrix times the basis; overwritten.
     """
-    before, now = basis.copy(), (2 / rest) * image - basis
+    rank, frames = basis.shape
+    before = np.empty((rank, frames), np.complex128)
+    for row in range(rank):
+        for place in range(frames):
+            before[row, place] = basis[row, place]
+            basis[row, place] = (2 / rest) * image[row, place] - basis[row, place]
     for _ in range(DEGREE - 1):
-        _multiply(gram, now, image)
-        before, now = now, (4 / rest) * image - 2 * now - before
-    basis[:] = now
+        _multiply(gram, basis, image)
+        for row in range(rank):
+            for place in range(frames):
+                after = (4 / rest) * image[row, place] - 2 * basis[row, place] - before[row, place]
+                before[row, place], basis[row, place] = basis[row, place], after
 
 
 @compiled
@@ -115,8 +124,8 @@ def enter_frame(frame: ComplexArray, slot: int, window: ComplexArray, turned: Co
         Its transpose.
     gram : (frames, frames) array
     """
-    window[slot] = frame
-    turned[:, slot] = frame
+    for tap in range(len(frame)):
+        window[slot, tap] = turned[tap, slot] = frame[tap]
     row = gram[slot]
     row[:] = 0
     for tap in range(len(frame)):
@@ -159,12 +168,13 @@ def refine(gram: ComplexArray, window: ComplexArray, turned: ComplexArray, shape
     """
     frames, taps = window.shape
     rank = len(shapes)
-    energy, weights = 0.0, np.zeros(frames)
+    energy, squares, weights = 0.0, 0.0, np.zeros(frames)
     for row in range(frames):
         energy += gram[row, row].real
         for place in range(frames):
             weights[place] += gram[row, place].real ** 2 + gram[row, place].imag ** 2
-    squares = weights.sum()
+    for weight in weights:
+        squares += weight
     if not ENERGY_RANGE[0] < energy < ENERGY_RANGE[1]:
         return False
     basis = np.zeros((rank, frames), np.complex128)
@@ -173,7 +183,7 @@ def refine(gram: ComplexArray, window: ComplexArray, turned: ComplexArray, shape
             _add_scaled(basis[shape], turned[tap], shapes[shape, tap])
     _orthonormalize(basis)
 
-    image, small = np.empty_like(basis), np.empty((rank, rank), np.complex128)
+    image, small = np.empty((rank, frames), np.complex128), np.empty((rank, rank), np.complex128)
     residual = np.inf
     while True:
         previous, residual = residual, 0.0
@@ -193,7 +203,9 @@ def refine(gram: ComplexArray, window: ComplexArray, turned: ComplexArray, shape
         if rest < lowest:
             _damp(gram, basis, image, rest)
         else:
-            basis[:] = image
+            for shape in range(rank):
+                for place in range(frames):
+                    basis[shape, place] = image[shape, place]
         _orthonormalize(basis)
 
     rounding = (taps + frames) * EPSILON * energy

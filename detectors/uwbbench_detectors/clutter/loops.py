@@ -159,7 +159,8 @@ def less_mean(
                 left[tap] = frame[tap] - head[tap] * share
         drop_rounding(left, frame, 2.0 * averaged)
         if window:
-            stretch[place] = frame
+            for tap in range(taps):
+                stretch[place, tap] = frame[tap]
             if place + 1 == window:
                 _finish_stretch(stretch, tail)
                 head[:] = 0
@@ -170,7 +171,8 @@ def less_mean(
 def _finish_stretch(stretch: ComplexArray, tail: ComplexArray) -> None:
     """Sums of a full stretch from each of its frames to the last, added from the last one on."""
     window, taps = stretch.shape
-    tail[window - 1] = stretch[window - 1]
+    for tap in range(taps):
+        tail[window - 1, tap] = stretch[window - 1, tap]
     for place in range(window - 2, -1, -1):
         for tap in range(taps):
             tail[place, tap] = tail[place + 1, tap] + stretch[place, tap]

@@ -24,7 +24,7 @@ class StsClutter(Stage[StsClutterParams]):
     """STS responses without an exponential average of those before, on the taps of aligned frames.
 
     Ringing of the chassis and the tail of the direct path are in the STS responses too, and drag the phase difference
-    of a weaker echo towards their own: in simulation a rod at 1 m and 30 degrees is seen at 12 degrees. Each response
+    of a weaker echo towards their own: in simulation a rod 85 cm away at 34 degrees is seen at 11. Each response
     is aligned and cleaned as ``align`` and ``clutter.exponential`` do it with the preamble, and then gets back the
     phase and gain of its own direct path, so that the difference between the two antennas is what it was. Read it
     with ``pdoa: {sample: same_tap}``: both responses then lie on the taps of the aligned preamble.

@@ -114,6 +114,7 @@ def examine_sets(
         Row 0 takes the properties of the peak, in the order of ``layout.COLUMNS``.
     """
     start = how[at.PROFILE_START]
+    none = 0 * start  # what is called with a plain 0 is compiled for it alone
     waiting, flat = short.maxima(profile, start, stop)
     if flat:
         return MORE
@@ -128,7 +129,7 @@ def examine_sets(
         if prominence >= limits[at.LEAST_PROMINENCE]:
             width = short.width_at(profile, tap, start, prominence, limits[at.RELATIVE_HEIGHT])
             verdict = _examine(
-                amplitude, responses1, responses2, how, limits, signal, tap, prominence, width, passed, 0
+                amplitude, responses1, responses2, how, limits, signal, tap, prominence, width, passed, none
             )
             if verdict != FAILED:
                 return 1 if verdict == PASSED else UNCLEAR
@@ -176,7 +177,8 @@ def examine_by_strength(
     """
     start = how[at.PROFILE_START]
     weakest = signal.noise * limits[at.LEAST_RATIO]
-    bound, best = STRONGER_THAN_ALL, -1
+    none = 0 * start  # what is called with a plain 0 is compiled for it alone
+    bound, best = STRONGER_THAN_ALL, none - 1
     for _ in range(TRIED_SINGLY):
         best = strongest_crest(heights, strengths, signal.earliest, bound, best)
         if best == FLAT:
@@ -190,7 +192,7 @@ def examine_by_strength(
         if prominence >= limits[at.LEAST_PROMINENCE]:
             width = width_of(profile, best, prominence, limits[at.RELATIVE_HEIGHT])
             verdict = _examine(
-                amplitude, responses1, responses2, how, limits, signal, best + start, prominence, width, passed, 0
+                amplitude, responses1, responses2, how, limits, signal, best + start, prominence, width, passed, none
             )
             if verdict != FAILED:
                 return 1 if verdict == PASSED else UNCLEAR
@@ -226,7 +228,7 @@ def examine_all(
     marked, places = np.empty(len(profile), np.uint8), np.empty(len(profile), np.int64)
     peaks = places[: find_maxima(profile, marked, places)]
     prominence = prominences_of(profile, peaks)
-    kept = 0
+    kept: int = 0 * start  # what is called with a plain 0 is compiled for it alone
     for number in range(len(peaks)):
         place = peaks[number]
         tap = place + start
@@ -242,7 +244,8 @@ def examine_all(
             return UNCLEAR
         if verdict == PASSED:
             if single and kept:
-                passed[0] = passed[1]
+                for column in range(passed.shape[1]):
+                    passed[0, column] = passed[1, column]
             else:
                 kept += 1
     return kept

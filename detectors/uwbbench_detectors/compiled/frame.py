@@ -14,6 +14,7 @@ import numpy as np
 
 from uwbbench.api import FloatArray, IntArray, compiled, inlined
 from uwbbench_detectors.compiled.layout import NEAR
+from uwbbench_detectors.compiled.rank import median
 
 FLAT = -2
 """In place of a tap: the profile has flat tops."""
@@ -82,7 +83,10 @@ def root_mean_square(amplitude: FloatArray, start: int, stop: int) -> float:
 @compiled
 def median_noise(amplitude: FloatArray) -> float:
     """Root mean square of the noise from the median magnitude, that of a Rayleigh distribution."""
-    return float(np.median(amplitude) / math.sqrt(math.log(2.0)))
+    heights = np.empty(len(amplitude))
+    for tap in range(len(amplitude)):
+        heights[tap] = amplitude[tap]
+    return median(heights) / math.sqrt(math.log(2.0))
 
 
 @compiled
@@ -185,12 +189,11 @@ def find_maxima(profile: FloatArray, marked: Any, peaks: IntArray) -> int:
     """
     bits = profile.view(np.int64)
     last = len(bits) - 1
-    flat = 0
+    flat = count = 0 * last  # what is called with a plain 0 is compiled for it alone
     for tap in range(1, last):
         rises = bits[tap] > bits[tap - 1]
         marked[tap] = rises & (bits[tap] >= bits[tap + 1])
         flat += rises & (bits[tap] == bits[tap + 1])
-    count = 0
     for tap in range(1, last):  # without a branch: which taps are maxima cannot be predicted
         peaks[count] = tap
         count += marked[tap]

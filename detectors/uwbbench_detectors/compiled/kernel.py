@@ -126,7 +126,7 @@ class FrameSearch(Kernel):
         robot_m = _NO_POSES
         response1 = response2 = samples
         if self._given:
-            given = np.zeros(len(samples)) if first_path is None else _plain(first_path)
+            given = _plain(np.zeros(len(samples)) if first_path is None else first_path)
         if self._phased:
             response1, response2 = _plain(frames.sts1), _plain(frames.sts2)
             if self._aligned and self._how[at.ALIGNED]:

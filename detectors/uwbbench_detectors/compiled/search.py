@@ -17,12 +17,16 @@ from uwbbench_detectors.compiled.layout import HOW, LIMITS, NEAR
 from uwbbench_detectors.compiled.place import azimuth_of, position_of, range_of
 from uwbbench_detectors.peaks.noise import FRAMES_TO_JUDGE, SUSPICIOUS_RATIO
 
+# Read-only in compiled code, as what a capture hands over: one search is compiled for both.
+_NO_VALUES: FloatArray = np.zeros(1)
+_NO_POSES: FloatArray = np.zeros((1, 3))
+
 
 @inlined
 def _noise(amplitude: FloatArray, how: IntArray) -> float:
     taps = how[at.NOISE_TAPS]
     if how[at.NOISE] == at.NOISE_LEADING:
-        return root_mean_square(amplitude, 0, taps)
+        return root_mean_square(amplitude, 0 * taps, taps)  # a plain 0 is compiled for by itself
     if how[at.NOISE] == at.NOISE_TAIL:
         return root_mean_square(amplitude, len(amplitude) - taps, len(amplitude))
     return median_noise(amplitude)
@@ -34,7 +38,7 @@ def _judge(amplitude: FloatArray, how: IntArray, noise_tally: IntArray) -> None:
     taps = how[at.NOISE_TAPS]
     tail = root_mean_square(amplitude, len(amplitude) - taps, len(amplitude))
     noise_tally[at.JUDGED] += 1
-    noise_tally[at.SUSPICIOUS] += root_mean_square(amplitude, 0, taps) > SUSPICIOUS_RATIO * tail
+    noise_tally[at.SUSPICIOUS] += root_mean_square(amplitude, 0 * taps, taps) > SUSPICIOUS_RATIO * tail
 
 
 @inlined
@@ -270,18 +274,17 @@ def search_alone(
     int
         As of :func:`search`.
     """
-    unused = limits
     return search(
         samples,
         valid,
-        unused,
+        _NO_VALUES,
         samples,
         samples,
-        unused,
-        unused,
-        unused,
-        table,
-        unused,
+        _NO_VALUES,
+        _NO_VALUES,
+        _NO_VALUES,
+        _NO_POSES,
+        _NO_VALUES,
         first,
         how,
         limits,

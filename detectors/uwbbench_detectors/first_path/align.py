@@ -89,7 +89,8 @@ class Align(Stage[AlignParams]):
         if self._skips:
             return block
         frames = block.frames
-        samples = np.ascontiguousarray(frames.preamble, dtype=np.complex128)
+        samples = np.ascontiguousarray(frames.preamble, dtype=np.complex128).view()
+        samples.flags.writeable = False  # as those of a capture, or all were compiled for either
         spectra = np.fft.fft(samples, axis=1)
         turned, crest_tap, clear = self._turned_spectra(samples, spectra, frames.valid, *self._settings)
         if not clear[frames.valid].all():

@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from uwbbench.api import BoolArray, ComplexArray, FloatArray, compiled
+from uwbbench_detectors.compiled.rank import median
 
 ROOT_2 = 1.4142135623730951 * (1 + 1e-9)
 ROOT_LN_2 = math.sqrt(math.log(2))
@@ -61,8 +62,10 @@ def noise_of(frame: ComplexArray, leading: int) -> float:
     for tap in range(len(heights)):
         heights[tap] = math.sqrt(frame[tap].real ** 2 + frame[tap].imag ** 2)
     if not leading:
-        return float(np.median(heights)) / ROOT_LN_2
-    largest, total = heights.max(), 0.0
+        return median(heights) / ROOT_LN_2
+    largest = total = 0.0
+    for height in heights:
+        largest = max(largest, height)
     for height in heights:
         total += (height / largest) ** 2 if largest > 0 else 0.0
     return float(largest * math.sqrt(total / leading))
@@ -111,7 +114,7 @@ def turned_spectra(
     """
     frames, taps = spectra.shape
     points = len(grid)
-    aligned = np.zeros_like(spectra)
+    aligned = np.empty((frames, taps), np.complex128)
     crest_tap, clear = np.empty(frames), np.zeros(frames, np.bool_)
     real, imaginary = np.empty(points), np.empty(points)
     for frame in range(frames):
@@ -129,8 +132,10 @@ def turned_spectra(
         peak = highest(real, imaginary)
         crest_tap[frame] = grid[peak]
         if 0 < peak < points - 1:
-            near = [math.hypot(real[peak + step], imaginary[peak + step]) for step in (-1, 0, 1)]
-            crest_tap[frame] += vertex_shift(near[0], near[1], near[2]) * (grid[1] - grid[0])
+            before = math.hypot(real[peak - 1], imaginary[peak - 1])
+            after = math.hypot(real[peak + 1], imaginary[peak + 1])
+            at_peak = math.hypot(real[peak], imaginary[peak])
+            crest_tap[frame] += vertex_shift(before, at_peak, after) * (grid[1] - grid[0])
         crest = 0j
         turned = aligned[frame]
         for frequency in range(taps // 2 + 1):

@@ -14,6 +14,9 @@ ALL_ROUND = np.radians(np.arange(-180.0, 180.0, 3.0))
 LOCAL = np.linspace(-3.0, 3.0, 13)
 """Directions that are tried: all round by one particle, then within three standard deviations by all."""
 ROUNDS = 3
+"""Steps of least squares for the distance."""
+FLATNESS_RAD = np.radians(0.2)
+"""Standard deviation of a direction that remains, as no wall is quite flat."""
 
 
 @dataclass(frozen=True)
@@ -138,25 +141,30 @@ def born(trail: Trail, best: int, sd_m: float, view_rad: float, sure_rad: float,
     cost, angle, sd, kind = point if point[0] + 9.0 < wall[0] else wall
     if sd > sure_rad or cost > worst * len(trail.half_m):
         return None
-    turned = wrap_angle(trail.facing[-1] - trail.facing[-1, best])
-    angles = angle + turned[:, None] + max(sd, np.radians(1.0)) * LOCAL
-    distance, variance, costs = _settled(kind, trail, angles, sd_m)
-    least = costs.min(axis=1, keepdims=True)
-    if not np.isfinite(least).all():
-        return None
-    likely = np.exp(-0.5 * (costs - least))
-    log_likelihood = -0.5 * least[:, 0] + np.log(likely.sum(axis=1))
-    likely /= likely.sum(axis=1, keepdims=True)
-    mean_angle, mean_distance = np.sum(likely * angles, axis=1), np.sum(likely * distance, axis=1)
-    off_angle, off_distance = angles - mean_angle[:, None], distance - mean_distance[:, None]
+    # Particles look elsewhere, but all hear it on the same side; then each goes on with what is left.
+    middle = angle + wrap_angle(trail.facing[-1] - trail.facing[-1, best])
+    width = np.full_like(middle, max(sd, np.radians(3.0)))
+    for _ in range(2):
+        angles = middle[:, None] + width[:, None] * LOCAL
+        distance, variance, costs = _settled(kind, trail, angles, sd_m)
+        least = costs.min(axis=1, keepdims=True)
+        if not np.isfinite(least).all():
+            return None
+        likely = np.exp(-0.5 * (costs - least))
+        log_likelihood = -0.5 * least[:, 0] + np.log(width * likely.sum(axis=1))
+        likely /= likely.sum(axis=1, keepdims=True)
+        middle = np.sum(likely * angles, axis=1)
+        width = np.maximum(np.sqrt(np.sum(likely * (angles - middle[:, None]) ** 2, axis=1)), np.radians(0.1))
+    mean_distance = np.sum(likely * distance, axis=1)
+    off_angle, off_distance = angles - middle[:, None], distance - mean_distance[:, None]
     cov = np.stack(
         [
             np.sum(likely * (off_distance**2 + variance), axis=1),
             np.sum(likely * off_distance * off_angle, axis=1),
-            np.sum(likely * off_angle**2, axis=1) + np.radians(0.5) ** 2,
+            np.sum(likely * off_angle**2, axis=1) + FLATNESS_RAD**2,
         ]
     )
-    mean = np.stack([mean_distance, mean_angle])
+    mean = np.stack([mean_distance, middle])
     if kind == WALL:
         ear, mouth = np.moveaxis(trail.ear, 1, 0), np.moveaxis(trail.mouth, 1, 0)
         return Birth(kind, mean, cov, log_likelihood, images.foot_along(ear, mouth, mean[0], mean[1]))

@@ -20,6 +20,8 @@ from uwbbench.api import LANDMARK_KINDS, FloatArray, IntArray, LandmarkKind, Lan
 from uwbbench_detectors.mappers.motion import HEAD, Motion, MotionParams, wrapped
 from uwbbench_detectors.mappers.rest import Rest, places_of
 
+_POSE = np.arange(3)
+
 
 class Model(Protocol):
     """How landmarks of one kind are seen; ``k`` numbers are measured of each."""
@@ -62,7 +64,7 @@ class _Mark:
 class Ekf:
     """The filter.
 
-    Landmarks are addressed by handles, which never return. All angles of the state are wrapped.
+    Landmarks are addressed by handles, which never return.
 
     Parameters
     ----------
@@ -79,8 +81,10 @@ class Ekf:
         self.motion = Motion(motion)
         self._mean = np.concatenate([np.asarray(pose, np.float64), [0.0, 0.0]])
         self._covariance = np.diag(self.motion.start_variance)
+        self._half = np.empty((0, 0))
         self._near: list[int] = []  # handles of the landmarks behind the head, in order
         self._starts: dict[int, int] = {}  # where each of them begins
+        self._kinds: dict[LandmarkKind, tuple[list[int], IntArray]] = {}  # of those asked for since they changed
         self._marks: dict[int, _Mark] = {}
         self._next = 0
         self._near_m, self._leave_m = near_m, near_m - reach_m
@@ -114,9 +118,9 @@ class Ekf:
         """Observations that a landmark is made of."""
         return self._marks[handle].support
 
-    def near(self, kind: str) -> list[int]:
+    def near(self, kind: LandmarkKind) -> list[int]:
         """Handles of the landmarks of one kind that are near."""
-        return [handle for handle in self._near if self._marks[handle].kind == kind]
+        return list(self._near_of(kind)[0])
 
     def predict(self, moved: FloatArray) -> None:
         """Move by a step (3,) of odometry, in the robot's frame before it."""
@@ -134,11 +138,6 @@ class Ekf:
 
     def expected(self, model: Model, handle: int) -> tuple[FloatArray, FloatArray]:
         """What would be measured of a near landmark now.
-
-        Parameters
-        ----------
-        model : Model
-        handle : int
 
         Returns
         -------
@@ -171,15 +170,18 @@ class Ekf:
         list of int, (m,) array
             Handles, and squared Mahalanobis distances of the measurement from what is expected of each.
         """
-        handles = self.near(model.kind) if handles is None else handles
+        if handles is None:
+            handles, starts = self._near_of(model.kind)
+        else:
+            starts = np.array([self._at(handle) for handle in handles], np.int64)
         if not handles:
             return [], np.zeros(0)
-        starts = np.array([self._at(handle) for handle in handles])
         marks = self._mean[starts[:, None] + np.arange(2)]
         expected, by_pose, by_mark = model.expected(self._mean[:3], marks)
         off = model.differences(measured, expected)
         by_both = np.concatenate([by_pose, by_mark], axis=2)
-        rows = np.concatenate([np.broadcast_to(np.arange(3), (len(starts), 3)), starts[:, None] + np.arange(2)], axis=1)
+        rows = np.empty((len(starts), 5), np.int64)
+        rows[:, :3], rows[:, 3], rows[:, 4] = _POSE, starts, starts + 1
         known = self._covariance[rows[:, :, None], rows[:, None, :]]
         spread = by_both @ known @ by_both.swapaxes(1, 2) + noise
         weighed = np.linalg.solve(spread, off[:, :, None])[:, :, 0]
@@ -244,6 +246,7 @@ class Ekf:
         self._next += 1
         self._near.append(handle)
         self._starts[handle] = size
+        self._kinds.pop(model.kind, None)
         self._marks[handle] = _Mark(handle if number is None else number, model.kind, 1)
         return handle
 
@@ -280,10 +283,19 @@ class Ekf:
         self._marks[kept].support += self._marks[dropped].support
         self.remove(dropped)
 
-    def landmarks(self, handles: list[int] | None = None) -> Landmarks:
-        """Some landmarks by their handles, near or far, or all of them."""
+    def landmarks(self, least_support: int = 1, handles: list[int] | None = None) -> Landmarks:
+        """Landmarks, near or far, by their handles.
+
+        Parameters
+        ----------
+        least_support : int
+            Observations that each is made of, at least.
+        handles : list of int, optional
+            All by default.
+        """
         self._settle()
-        kept = sorted(self._marks if handles is None else handles)
+        wanted = sorted(self._marks if handles is None else handles)
+        kept = [handle for handle in wanted if self._marks[handle].support >= least_support]
         if not kept:
             return Landmarks.none()
         marks = [self._marks[handle] for handle in kept]
@@ -303,8 +315,16 @@ class Ekf:
         """First of the two places of a near landmark in the near state."""
         return self._starts[handle]
 
+    def _near_of(self, kind: LandmarkKind) -> tuple[list[int], IntArray]:
+        """Handles of the near landmarks of a kind, and where they begin in the near state; not to be changed."""
+        if kind not in self._kinds:
+            handles = [handle for handle in self._near if self._marks[handle].kind == kind]
+            self._kinds[kind] = handles, np.array([self._starts[handle] for handle in handles], np.int64)
+        return self._kinds[kind]
+
     def _set_near(self, handles: list[int]) -> None:
         self._near = handles
+        self._kinds = {}
         self._starts = {handle: HEAD + 2 * place for place, handle in enumerate(handles)}
 
     def _difference(self, one: int, other: int) -> tuple[IntArray, FloatArray, FloatArray]:
@@ -352,8 +372,11 @@ class Ekf:
             gain[held] = 0.0
         self._mean += gain @ off
         self._mean[2] = wrapped(self._mean[2])
-        half = gain @ across.T - gain @ (spread / 2) @ gain.T
-        self._covariance -= half + half.T
+        if self._half.shape != self._covariance.shape:
+            self._half = np.empty(self._covariance.shape)  # asking for fresh memory takes longer than all the rest
+        np.dot(gain, across.T - spread / 2 @ gain.T, out=self._half)
+        self._covariance -= self._half
+        self._covariance -= self._half.T
         self._rest.correct(seen, weight if learning is None else None, off, gain, rows)
         return float(off @ weight @ off)
 
@@ -370,8 +393,8 @@ class Ekf:
         near = np.hypot(*(places - self._center_m).T) <= self._near_m
         always = np.array([self._marks[handle].kind != "point" for handle in rest.handles], bool)
         chosen = near | always
-        self._set_near([handle for handle, taken in zip(rest.handles, chosen, strict=True) if taken])
-        resting = [handle for handle, taken in zip(rest.handles, chosen, strict=True) if not taken]
+        self._set_near([rest.handles[place] for place in np.flatnonzero(chosen)])
+        resting = [rest.handles[place] for place in np.flatnonzero(~chosen)]
         columns = places_of(rest.handles, self._near)
         rest.enter(columns, resting)
         self._mean, self._covariance = rest.mean[columns], rest.covariance[np.ix_(columns, columns)]

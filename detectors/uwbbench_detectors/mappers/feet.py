@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from uwbbench.api import FloatArray
+from uwbbench.api import BoolArray, FloatArray
 from uwbbench_detectors.mappers.line import piece
 
 
@@ -58,7 +58,8 @@ class Feet:
         """Ends (k, 2, 2) of the pieces of the line (2,) that have been seen."""
         return np.array([piece(line, start, stop) for start, stop in self.pieces_m]).reshape(-1, 2, 2)
 
-    def covers(self, along_m: float, margin_m: float) -> bool:
-        """Whether a place along the line is at most ``margin_m`` beside a piece that has been seen."""
-        pieces_m = self.pieces_m
-        return bool(((pieces_m[:, 0] - margin_m <= along_m) & (along_m <= pieces_m[:, 1] + margin_m)).any())
+    def covers(self, along_m: FloatArray, margin_m: float) -> BoolArray:
+        """Which places (n,) along the line are at most ``margin_m`` beside a piece that has been seen (n,)."""
+        starts_m, stops_m = self.pieces_m.T
+        places_m = along_m[:, None]
+        return np.asarray(((starts_m - margin_m <= places_m) & (places_m <= stops_m + margin_m)).any(axis=1))

@@ -108,9 +108,7 @@ class LandmarkTable:
             found[:, :, rows] = of(ear, mouth, self.planes[A][:, places[rows]], self.planes[B][:, places[rows]])
         return found
 
-    def correct(
-        self, who: IntArray, which: IntArray, off: FloatArray, slopes: FloatArray, variance: FloatArray
-    ) -> None:
+    def correct(self, who: IntArray, which: IntArray, off: FloatArray, slopes: FloatArray, variance: float) -> None:
         """Put a reading into one landmark of each of some particles.
 
         ``K = P H' / S``, ``P <- (I - K H) P (I - K H)' + K R K'``, which stays positive.

@@ -140,7 +140,7 @@ class Points:
 
     def landmarks(self) -> Landmarks:
         """Confirmed landmarks, with the windows that each was seen in as support."""
-        return self._ekf.landmarks([handle for handle in self._evidence.handles if self._evidence.confirmed(handle)])
+        return self._ekf.landmarks(handles=[one for one in self._evidence.handles if self._evidence.confirmed(one)])
 
     def _assigned(self, squared: FloatArray, handles: list[int]) -> dict[int, int]:
         """Column of each row that has one: the nearest pair first, those of confirmed landmarks before others."""

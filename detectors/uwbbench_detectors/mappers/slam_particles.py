@@ -34,6 +34,8 @@ from uwbbench_detectors.mappers.particles import Particles
 
 COLLAPSED = 0.1
 """Share of the particles below which their effective number says that they disagree with all that is heard."""
+WORST = 1.0
+"""Largest mean squared residual, in standard deviations, of the readings that a landmark begins with."""
 LONGEST = 40
 """Readings that are kept of a track that no landmark explains."""
 
@@ -54,20 +56,31 @@ class SlamParticlesParams(Params):
         (0.20, 5.0), description="[metres, degrees]: walls no farther apart, in distance and direction, are one."
     )
     new: int = Field(3, ge=2, description="Fewest readings that a landmark begins with.")
-    new_travel_m: float = Field(0.5, ge=0.5, description="Least way over which it has been heard by then.")
+    new_travel_m: float = Field(
+        1.0,
+        ge=0.5,
+        description="Least way over which it has been heard by then; what is heard for less is often a ghost.",
+    )
     new_bearing_sd_deg: float = Field(
         8.0, gt=0, description="Largest standard deviation of its direction then; until it is less, one waits."
     )
     read_m: float = Field(
         0.10, gt=0, description="Way between two readings of a track, whose filter remembers: the rest is not new."
     )
-    nearest_m: float = Field(0.8, ge=0, description="Nearer ranges are not used: antennas ring there.")
+    nearest_m: float = Field(0.85, ge=0, description="Nearer ranges are not used: antennas ring there.")
     farthest_m: float = Field(5.0, gt=0, description="Farther ranges are not used.")
-    view_deg: float = Field(75.0, gt=0, le=180, description="Directions that an ear hears from, to both sides.")
+    view_deg: float = Field(
+        75.0, gt=0, le=180, description="A landmark begins within this of where an ear looks, to both sides."
+    )
+    heard_deg: float = Field(140.0, gt=0, le=180, description="A known wall is heard within this.")
+    resolution_m: float = Field(
+        0.30, ge=0, description="Two echoes closer than this are one peak at the range of neither, and are not used."
+    )
+    trusted_support: int = Field(12, ge=0, description="Readings before a landmark has a say in where the robot is.")
     gate_sigmas: float = Field(3.0, gt=0, description="A range belongs to a landmark within these standard deviations.")
     beyond_m: float = Field(2.0, ge=0, description="By how far a wall may go on beyond where it was seen.")
     least_support: int = Field(8, ge=1, description="Readings that a landmark of the map is made of.")
-    motion: MotionParams = Field(default_factory=MotionParams)
+    motion: MotionParams = Field(MotionParams.model_validate({}), description="How odometry errs.")
     seed: int = Field(1, ge=0, description="Of all draws.")
 
 
@@ -206,12 +219,22 @@ class SlamParticles(Mapper[SlamParticlesParams]):
         spread += variance
         squared = off**2 / spread
         fits = (squared < p.gate_sigmas**2) & ~taken[:, near]
+        # An ear hears little of what is behind it.
+        away = wrap_angle(planes[B] - placed[4][:, None])
+        heard = (np.abs(away) < math.radians(p.heard_deg)) | (known.kind[near] != WALL)
+        fits &= heard
         likely = np.where(fits, p.range_sd_m / np.sqrt(spread) * np.exp(-0.5 * squared), 0.0)
         column = np.argmax(likely, axis=1)
         rows = np.arange(len(column))
         highest = likely[rows, column]
         weight = particles.weight
-        particles.log_weight += np.log(p.clutter + highest)
+        beside = np.abs(expected[0] - expected[0][rows, column][:, None]) < p.resolution_m
+        beside &= heard
+        if float(weight @ ((beside.sum(axis=1) > 1) & (highest > 0))) > 0.5:
+            return True  # two echoes that are not resolved: one peak, at the range of neither
+        # What has just begun may be no landmark: it says nothing of the pose yet.
+        highest_known = np.where(planes[SUPPORT][rows, column] >= p.trusted_support, highest, 0.0)
+        particles.log_weight += np.log(p.clutter + highest_known)
         who = np.flatnonzero(highest > 0)
         if len(who):
             which = near[column[who]]
@@ -232,7 +255,7 @@ class SlamParticles(Mapper[SlamParticlesParams]):
         placed = np.stack(track.placed)
         trail = Trail(np.array(track.half_m), placed[:, :2], placed[:, 2:4], placed[:, 4])
         best = self._particles.best
-        birth = born(trail, best, p.range_sd_m, math.radians(p.view_deg), math.radians(p.new_bearing_sd_deg), 2.0)
+        birth = born(trail, best, p.range_sd_m, math.radians(p.view_deg), math.radians(p.new_bearing_sd_deg), WORST)
         if birth is None:
             return False
         planes = np.zeros((8, p.particles))
@@ -270,7 +293,7 @@ class SlamParticles(Mapper[SlamParticlesParams]):
         """Covariance of a pose in the frame of the start pose, in the frame of the run."""
         cosine, sine = math.cos(self._start[2]), math.sin(self._start[2])
         turn = np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
-        return turn @ covariance @ turn.T
+        return np.asarray(turn @ covariance @ turn.T)
 
     def _map(self) -> Map:
         """What the particles know together, in the frame of the run."""

@@ -2,15 +2,26 @@
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 
-from uwbbench.api import BoolArray, Detections, FloatArray, Radar, wrap_angle
+from uwbbench.api import BoolArray, Detections, FloatArray, Radar, compose, wrap_angle
 from uwbbench_detectors.mappers.echoes import Echoes
-from uwbbench_detectors.mappers.motion import composed
 from uwbbench_detectors.mappers.walls import WallParams
+from uwbbench_detectors.mappers.window import WindowParams
+
+
+@dataclass(frozen=True)
+class _Found:
+    """Rows of one receiver in one step, and which of them are echoes that count."""
+
+    receiver: str
+    rows: Detections
+    counts: BoolArray
 
 
 class Stretch:
@@ -22,50 +33,68 @@ class Stretch:
     Parameters
     ----------
     params : WallParams
+    window : WindowParams
+        How long a window is.
     radars : mapping of str to Radar
         By receiver.
-    windows : int
-        Windows that unexplained echoes are kept for.
     """
 
-    def __init__(self, params: WallParams, radars: Mapping[str, Radar], windows: int) -> None:
-        self._params = params
+    def __init__(self, params: WallParams, window: WindowParams, radars: Mapping[str, Radar]) -> None:
+        self._params, self._window = params, window
         self._mounts = {
             name: np.array([*radar.mount_position_m[:2], radar.mount_yaw_rad]) for name, radar in radars.items()
         }
-        self._pose: FloatArray = np.zeros(3)
-        self._fresh: list[Echoes] = []
-        self._kept: deque[Echoes] = deque(maxlen=windows)
+        self._first = True
+        self._kept: deque[Echoes] = deque(maxlen=max(1, round(params.stretch_m / window.travel_m)))
+        self.clear()
 
     def clear(self) -> None:
         """Forget all echoes, as where they and those to come have no frame in common."""
-        self._fresh.clear()
+        self._pose: FloatArray = np.zeros(3)
         self._kept.clear()
+        self._begin()
 
-    def move(self, moved: FloatArray) -> None:
-        """Move by a step (3,) of odometry."""
-        self._pose = composed(self._pose, moved)
-
-    def add(self, found: Mapping[str, Detections]) -> None:
-        """Take in what receivers have found where the robot is now.
+    def add(self, moved: FloatArray, found: Mapping[str, Detections]) -> None:
+        """Take in a step.
 
         Parameters
         ----------
+        moved : (3,) array
+            Odometry since the step before.
         found : mapping of str to Detections
             By receiver. Rows whose range or azimuth is not finite are left out.
         """
-        p = self._params
-        for name, rows in found.items():
-            range_m, azimuth_rad = rows.range_m, rows.azimuth_rad
-            counts = (range_m >= p.nearest_m) & (range_m <= p.farthest_m)
-            counts &= np.abs(azimuth_rad) <= np.radians(p.azimuth_deg)
-            pose = composed(self._pose, self._mounts[name])
-            receiver_m = np.tile(pose[:2], (int(np.count_nonzero(counts)), 1))
-            self._fresh.append(Echoes(receiver_m, range_m[counts], wrap_angle(pose[2] + azimuth_rad[counts])))
+        self._pose = compose(self._pose, moved)
+        way, turn = math.hypot(moved[0], moved[1]), abs(float(moved[2]))
+        self._travel_m += way
+        self._turn_rad += turn
+        stands = not self._first and way <= self._window.standing_m and turn <= self._window.standing_rad
+        self._first = False
+        self._steps.append((moved, [] if stands else [self._take_in(name, rows) for name, rows in found.items()]))
 
-    def close(self) -> Echoes:
-        """Echoes of the window, in the robot's frame now; the next one begins when :meth:`keep` has been called."""
+    @property
+    def full(self) -> bool:
+        """Whether the robot has gone as far as a window reaches."""
+        return self._travel_m >= self._window.travel_m or self._turn_rad >= self._window.turn_rad
+
+    @property
+    def echoes(self) -> Echoes:
+        """Echoes (n,) of the window, in the robot's frame now."""
         return Echoes.join(self._fresh).seen_from(self._pose)
+
+    def steps(self, free: BoolArray) -> list[tuple[FloatArray, dict[str, Detections]]]:
+        """Movements and rows of the window, step by step, without the rows of echoes (n,) that are not free."""
+        left, start = [], 0
+        for moved, parts in self._steps:
+            found = {}
+            for part in parts:
+                stop = start + int(np.count_nonzero(part.counts))
+                keeps = np.ones(len(part.rows), bool)
+                keeps[part.counts] = free[start:stop]
+                found[part.receiver] = part.rows.take(keeps)
+                start = stop
+            left.append((moved, found))
+        return left
 
     def keep(self, unexplained: BoolArray) -> Echoes:
         """Begin the next window, and keep some echoes (n,) of the last one for walls to come.
@@ -76,7 +105,7 @@ class Stretch:
             All that are kept, in the robot's frame now.
         """
         self._kept.append(Echoes.join(self._fresh).take(unexplained))
-        self._fresh.clear()
+        self._begin()
         return Echoes.join(list(self._kept)).seen_from(self._pose)
 
     def drop(self, explained: BoolArray) -> None:
@@ -84,3 +113,18 @@ class Stretch:
         ends = np.cumsum([len(part) for part in self._kept])[:-1]
         for place, gone in enumerate(np.split(explained, ends)):
             self._kept[place] = self._kept[place].take(~gone)
+
+    def _begin(self) -> None:
+        self._travel_m = self._turn_rad = 0.0
+        self._steps: list[tuple[FloatArray, list[_Found]]] = []
+        self._fresh: list[Echoes] = []
+
+    def _take_in(self, receiver: str, rows: Detections) -> _Found:
+        p = self._params
+        range_m, azimuth_rad = rows.range_m, rows.azimuth_rad
+        counts = (range_m >= p.nearest_m) & (range_m <= p.farthest_m)
+        counts &= np.abs(azimuth_rad) <= np.radians(p.azimuth_deg)
+        pose = compose(self._pose, self._mounts[receiver])
+        receiver_m = np.tile(pose[:2], (int(np.count_nonzero(counts)), 1))
+        self._fresh.append(Echoes(receiver_m, range_m[counts], wrap_angle(pose[2] + azimuth_rad[counts])))
+        return _Found(receiver, rows, counts)

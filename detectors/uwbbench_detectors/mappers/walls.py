@@ -34,12 +34,12 @@ class WallParams(Params):
         27.0, gt=0, description="The same for its direction and the wall's normal; both bounds are those of an ellipse."
     )
     stretch_m: float = Field(2.4, gt=0, description="Way whose echoes new walls are sought in.")
-    shortest_m: float = Field(1.3, gt=0, description="A new wall is seen along this length at least.")
-    inliers_per_m: float = Field(32.0, gt=0, description="Echoes of a new wall on a metre of it.")
+    shortest_m: float = Field(1.9, gt=0, description="A new wall is seen along this length at least.")
+    inliers_per_m: float = Field(28.0, gt=0, description="Echoes of a new wall on a metre of it.")
     quadrat_m: float = Field(0.30, gt=0, description="Pieces in which the echoes along a wall are counted.")
     filled: float = Field(0.8, ge=0, le=1, description="Share of a new wall's pieces with at least two echoes.")
     uneven: float = Field(
-        5.0,
+        3.0,
         gt=0,
         description="Variance of the echoes in a new wall's pieces over their mean. Scattered evenly it is 1; where "
         "the robot drives towards a wall all echoes come from one foot.",

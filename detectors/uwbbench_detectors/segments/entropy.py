@@ -125,12 +125,12 @@ class EntropySegments(Stage[EntropyParams]):
     def step(self, block: Block) -> Block:
         """Block with a detection for each segment, by frame and then tap."""
         frames = block.frames
-        row, found, silent = self._segments(frames.amplitude, block.part("first_path"), *self._settings)
+        first_path = block.part("first_path")
+        found, silent = self._segments(frames.amplitude, first_path, frames.first, *self._settings)
         if silent:
             self.note(
                 "segment.entropy: in some frames the entropies of the tail have no spread; without noise there is no "
                 "threshold, and nothing is found in them"
             )
-        found.view(np.int64)[:, 0] = row + frames.first
         looked_at = (frames.first, np.ones(len(frames), bool))
         return block.replace(detections=Detections.of_table(_COLUMNS, found, looked_at, ()))

@@ -6,8 +6,9 @@ import math
 
 import numpy as np
 
-from uwbbench.api import FloatArray, IntArray, compiled
+from uwbbench.api import FloatArray, compiled
 from uwbbench_detectors.cfar.windows import window_sums
+from uwbbench_detectors.compiled.rank import median, sort
 
 GAUSS, VASICEK = range(2)
 """Codes of the estimators."""
@@ -47,8 +48,9 @@ def entropies(
         return
     ordered = scratch[0, :window]
     for first in range(len(entropy)):
-        ordered[:] = amplitude[first : first + window]
-        ordered.sort()
+        for place in range(window):
+            ordered[place] = amplitude[first + place]
+        sort(ordered)
         total = 0.0
         for rank in range(window):
             gap = ordered[min(rank + spacing, window - 1)] - ordered[max(rank - spacing, 0)]
@@ -57,23 +59,15 @@ def entropies(
 
 
 @compiled
-def _median(values: FloatArray) -> float:
-    """Median of values, which are sorted in place."""
-    values.sort()
-    half = len(values) // 2
-    middle: float = values[half] if len(values) % 2 else (values[half - 1] + values[half]) / 2
-    return middle
-
-
-@compiled
 def segments(
     amplitude: FloatArray,
     first_path: FloatArray,
+    first_frame: int,
     estimator: tuple[int, int, int],
     tail: int,
     sigmas: float,
     shape: tuple[float, int, int],
-) -> tuple[IntArray, FloatArray, bool]:
+) -> tuple[FloatArray, bool]:
     """Runs of windows whose entropy exceeds that of the tail, by frame and then tap.
 
     Parameters
@@ -82,6 +76,8 @@ def segments(
         Magnitudes.
     first_path : (frames,) array
         Fractional tap of the direct path.
+    first_frame : int
+        Number of the first frame.
     estimator : (int, int, int)
         GAUSS or VASICEK, samples of a window, spacing.
     tail : int
@@ -94,10 +90,9 @@ def segments(
 
     Returns
     -------
-    row : (n,) int array
     found : (n, 6) array
-        Left free; taps of the strongest sample, of the start and of the stop; its amplitude; ``score_db``, the largest
-        entropy of the run over the tail's median, as a ratio of powers.
+        Number of the frame, by its bits; taps of the strongest sample, of the start and of the stop; its amplitude;
+        ``score_db``, the largest entropy of the run over the tail's median, as a ratio of powers.
     silent : bool
         Whether a frame with a signal has a tail whose entropies have no spread; nothing is found there.
     """
@@ -106,7 +101,8 @@ def segments(
     frames, taps = amplitude.shape
     windows = taps - window + 1
     scratch, level, entropy, reference = np.empty((4, taps)), np.empty(taps), np.empty(windows), np.empty(tail)
-    row, found = np.empty(frames * ((windows + 1) // 2), np.int64), np.empty((frames * ((windows + 1) // 2), 6))
+    found = np.empty((frames * ((windows + 1) // 2), 6))
+    bits = found.view(np.int64)
     to_middle, decibels = (window - 1) / 2, (20 if kind == VASICEK else 10) / math.log(10)
     count, silent = 0, False
     for frame in range(frames):
@@ -117,11 +113,12 @@ def segments(
         for tap in range(taps):  # so that no square over- or underflows
             level[tap] = amplitude[frame, tap] / unit
         entropies(level, window, spacing, kind, scratch, entropy)
-        reference[:] = entropy[windows - tail :]
-        centre = _median(reference)
+        for place in range(tail):
+            reference[place] = entropy[windows - tail + place]
+        centre = median(reference)
         for place in range(tail):
             reference[place] = abs(entropy[windows - tail + place] - centre)
-        spread = _median(reference)
+        spread = median(reference)
         if not (spread > 0 and math.isfinite(centre)):
             silent = True
             continue
@@ -137,11 +134,11 @@ def segments(
                     for tap in range(crest + 1, stop + window // 2 + 1):
                         if level[tap] > level[crest]:
                             crest = tap
-                    row[count] = frame
+                    bits[count, 0] = first_frame + frame
                     found[count, 1] = crest
                     found[count, 2], found[count, 3] = start + to_middle - 0.5, stop + to_middle + 0.5
                     found[count, 4] = amplitude[frame, crest]
                     found[count, 5] = decibels * (entropy[start : stop + 1].max() - centre)
                     count += 1
                 start = stop = first
-    return row[:count].copy(), found[:count].copy(), silent
+    return found[:count].copy(), silent

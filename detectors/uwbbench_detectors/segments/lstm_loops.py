@@ -65,7 +65,8 @@ def probabilities(
             cell[:] = 0.0
             for place in range(steps):
                 step = steps - 1 - place if direction else place
-                gates[:] = bias[direction]
+                for gate in range(4 * hidden):
+                    gates[gate] = bias[direction, gate]
                 for number in range(count):
                     value = scaled[step, number]
                     for gate in range(4 * hidden):

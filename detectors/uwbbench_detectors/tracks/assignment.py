@@ -29,27 +29,40 @@ def assigned(cost: FloatArray) -> IntArray:
     cannot be called from compiled code.
     """
     rows, columns = cost.shape
-    column_of = np.full(rows, -1)
-    if rows > columns:
-        row_of = _by_rows(cost.T.copy())
+    if rows <= columns:
+        return _by_rows(cost)
+    turned = np.empty((columns, rows))
+    for row in range(rows):
         for column in range(columns):
+            turned[column, row] = cost[row, column]
+    return _inverse(_by_rows(turned), columns, rows)
+
+
+@compiled
+def _inverse(row_of: IntArray, columns: int, rows: int) -> IntArray:
+    """Column of each row, -1 for none, from the row of each column."""
+    column_of = np.empty(rows, np.int64)
+    column_of[:] = -1
+    for column in range(columns):
+        if row_of[column] >= 0:
             column_of[row_of[column]] = column
-        return column_of
-    return _by_rows(cost)
+    return column_of
 
 
 @compiled
 def _by_rows(cost: FloatArray) -> IntArray:
     """As :func:`assigned`, for at most as many rows as columns."""
     rows, columns = cost.shape
-    row_of = np.full(columns + 1, -1)  # the last column is where the row that seeks a place starts
-    previous = np.empty(columns + 1, np.int64)
-    of_row, of_column = np.zeros(rows), np.zeros(columns + 1)
+    # The last column is where the row that seeks a place starts.
+    row_of, previous = np.empty(columns + 1, np.int64), np.empty(columns + 1, np.int64)
+    row_of[:] = -1
+    of_row, of_column, shortest = np.zeros(rows), np.zeros(columns + 1), np.empty(columns + 1)
+    reached = np.empty(columns + 1, np.bool_)
     for row in range(rows):
         at = columns
         row_of[at] = row
-        shortest = np.full(columns + 1, np.inf)
-        reached = np.zeros(columns + 1, np.bool_)
+        shortest[:] = np.inf
+        reached[:] = False
         while row_of[at] >= 0:
             reached[at] = True
             seeking, step, onward = row_of[at], np.inf, columns
@@ -73,8 +86,4 @@ def _by_rows(cost: FloatArray) -> IntArray:
             row_of[at] = row_of[previous[at]]
             at = previous[at]
         row_of[columns] = -1
-    column_of = np.full(rows, -1)
-    for column in range(columns):
-        if row_of[column] >= 0:
-            column_of[row_of[column]] = column
-    return column_of
+    return _inverse(row_of, columns, rows)

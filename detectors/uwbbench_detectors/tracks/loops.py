@@ -50,6 +50,21 @@ SHARED = 5
 
 
 @compiled
+def _copy(source: FloatArray, target: FloatArray) -> None:
+    for field in range(len(source)):
+        target[field] = source[field]
+
+
+@compiled
+def _with_room(table: FloatArray, rows: int) -> FloatArray:
+    """A table with room for twice as many rows, whose first ones are these."""
+    larger = np.empty((2 * len(table), table.shape[1]))
+    for row in range(rows):
+        _copy(table[row], larger[row])
+    return larger
+
+
+@compiled
 def _associate(tracks: FloatArray, start: int, stop: int, here: FloatArray, used: BoolArray, at: FloatArray) -> None:
     """Give a group of tracks the detections that are not used yet, so that the sum of squared distances is least.
 
@@ -98,7 +113,7 @@ def _forget(tracks: FloatArray, carried: FloatArray, oldest_s: float, at: FloatA
         hopeless = track[NUMBER] < 0 and track[HITS] + at[FRAMES_ALLOWED] - track[FRAMES] < at[HITS_ASKED]
         if track[HIT_S] >= oldest_s and not hopeless:
             confirmed += track[NUMBER] >= 0
-            tracks[kept] = track
+            _copy(track, tracks[kept])
             kept += 1
     carried[COUNT], carried[CONFIRMED] = kept, confirmed
 
@@ -181,22 +196,23 @@ def _confirm(tracks: FloatArray, carried: FloatArray, here: FloatArray, at: Floa
     count, confirmed = int(carried[COUNT]), int(carried[CONFIRMED])
     chosen = -1
     if at[ONE] > 0:
-        rows = tracks[confirmed:count, ROW].copy()
+        rows = np.empty(count - confirmed)
         for place in range(len(rows)):
-            if tracks[confirmed + place, HITS] < at[HITS_ASKED]:
-                rows[place] = -1
+            ready = tracks[confirmed + place, HITS] >= at[HITS_ASKED]
+            rows[place] = tracks[confirmed + place, ROW] if ready else -1
         chosen = _first(here, rows, at[NEAREST] > 0)
         if chosen < 0:
             return
         chosen += confirmed
     for place in range(confirmed, count):
         if tracks[place, HITS] >= at[HITS_ASKED] and (chosen < 0 or place == chosen):
-            track = tracks[place].copy()
+            track = np.empty(FIELDS)
+            _copy(tracks[place], track)
             track[NUMBER] = carried[NEXT]
             carried[NEXT] += 1
             for later in range(place, confirmed, -1):
-                tracks[later] = tracks[later - 1]
-            tracks[confirmed] = track
+                _copy(tracks[later - 1], tracks[later])
+            _copy(track, tracks[confirmed])
             confirmed += 1
     carried[CONFIRMED] = confirmed
     if at[ONE] > 0:
@@ -233,9 +249,7 @@ def _start(tracks: FloatArray, carried: FloatArray, here: FloatArray, used: Bool
         if not used[row] and (chosen < 0 or row == chosen):
             count = int(carried[COUNT])
             if count == len(tracks):
-                larger = np.empty((2 * count, FIELDS))
-                larger[:count] = tracks
-                tracks = larger
+                tracks = _with_room(tracks, count)
             _begin(tracks[count], here[row], row, carried, at)
             carried[COUNT] += 1
     return tracks
@@ -341,8 +355,6 @@ def follow(
             _confirm(tracks, carried, here, at)
 
         while written + carried[COUNT] > len(table):
-            larger = np.empty((2 * len(table), table.shape[1]))
-            larger[:written] = table[:written]
-            table = larger
+            table = _with_room(table, written)
         written = _write(tracks, carried, here, at, first + frame, table, written)
     return tracks, table[:written]

@@ -26,7 +26,9 @@ def transform(signal: FloatArray, low: FloatArray, high: FloatArray, bands: Floa
         Becomes the approximation of the last level, and the details from the last level to the first.
     """
     length, levels = len(signal), bands.shape[1] - 1
-    approximation, coarser = signal.copy(), np.empty(length)
+    approximation, coarser = np.empty(length), np.empty(length)
+    for place in range(length):
+        approximation[place] = signal[place]
     for level in range(levels):
         step = 1 << level
         for place in range(length):
@@ -37,8 +39,9 @@ def transform(signal: FloatArray, low: FloatArray, high: FloatArray, bands: Floa
                 detail += high[coefficient] * value
             coarser[place] = total
             bands[place, levels - level] = detail
-        approximation[:] = coarser
-    bands[:, 0] = approximation
+        approximation, coarser = coarser, approximation
+    for place in range(length):
+        bands[place, 0] = approximation[place]
 
 
 @compiled

@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.lib.stride_tricks import sliding_window_view
 
+from uwbbench.api.arrays import locked
 from uwbbench_detectors.cfar.factors import order_rank
 from uwbbench_detectors.cfar.windows import CA, GO, OS, SO, detect, window_sums
 
@@ -114,7 +115,7 @@ def test_detected_cells_are_those_of_numpy(kind, statistic, half, guard, extra, 
     cells = 2 * (half + guard) + extra
     if not cells:
         return
-    amplitude = frames_of(kind, np.random.default_rng(seed), (12, cells + start))
+    amplitude = locked(frames_of(kind, np.random.default_rng(seed), (12, cells + start)))  # as those of a capture
     places = (order_rank(rank, half), order_rank(rank, 2 * half))
     factors = np.full(cells, 1.1 * factor)
     factors[half + guard : cells - half - guard] = factor

@@ -1,5 +1,6 @@
 """Sections about errors: charts of causes, and of detectors without their thresholds."""
 
+import dataclasses
 import math
 
 import altair
@@ -52,6 +53,14 @@ def test_lines_go_through_the_counts_at_every_threshold(content: Content, charts
 def test_a_detector_that_finds_nothing_has_no_line(content: Content, charts: list[Spec]) -> None:
     assert "null" not in {row["detector"] for row in charts[1]["data"]["values"]}
     curves = {"null": content.report.curves["plates", "simulated", "null"]}
+    assert precision_against_recall("title", curves, content.detectors) is None
+    assert recall_against_false_alarms("title", curves, content.detectors) is None
+
+
+def test_captures_with_nothing_to_find_have_no_line(content: Content) -> None:
+    curve = content.report.curves["plates", "simulated", "paper"]
+    unknown = curve.recall._replace(value=np.full(curve.recall.value.shape, np.nan))
+    curves = {"paper": dataclasses.replace(curve, recall=unknown)}
     assert precision_against_recall("title", curves, content.detectors) is None
     assert recall_against_false_alarms("title", curves, content.detectors) is None
 

@@ -29,6 +29,11 @@ def outcome_of(scoring: str) -> type[Outcome]:
     return _OUTCOMES.get(scoring, Outcome)
 
 
+def has_causes(scoring: str) -> bool:
+    """Whether errors in a scoring have causes: not by the latest answer, nor of presence and whole runs."""
+    return scoring not in ("latest", "presence") and not outcome_of(scoring).of_run
+
+
 def applies(metric: type[Metric], scoring: str) -> bool:
     """Whether a metric has a meaning in a scoring: where runs are judged, none that counts detections has."""
     made = outcome_of(scoring)

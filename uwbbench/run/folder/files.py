@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from uwbbench.api.errors import StoreError
+from uwbbench.api.text import one_line
 from uwbbench.run.folder.identity import plain
 
 if TYPE_CHECKING:
@@ -24,7 +25,7 @@ def disk_errors(path: Path, verb: str) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        raise StoreError(f"{path}: cannot be {verb}: {error.strerror or error}") from error
+        raise StoreError(f"{path}: cannot be {verb}: {one_line(error.strerror or error)}") from error
 
 
 @contextmanager
@@ -116,5 +117,5 @@ def read_parquet(path: Path) -> tuple[pa.Table, Any]:
             # One thread: the files of a run are many and small, and a thread for each column costs more than it reads.
             table = pq.ParquetFile(path).read(use_threads=False)
     except pa.ArrowException as error:
-        raise StoreError(f"{path}: is not a readable Parquet file: {error}") from error
+        raise StoreError(f"{path}: is not a readable Parquet file: {one_line(error)}") from error
     return table, json.loads((table.schema.metadata or {}).get(_FACTS, b"{}"))

@@ -182,8 +182,7 @@ class RunFolder:
         map_ = self._map(unit)
         if not (self.has_poses(unit) or map_.is_file()):
             return found
-        on_the_way, smoothed = mapped.read_poses(self._file("poses", unit))
-        return found.annotated(mapped=Mapped(on_the_way, mapped.read_map(map_), smoothed))
+        return found.annotated(mapped=mapped.read_mapped(self._file("poses", unit), map_))
 
     def has_poses(self, unit: str) -> bool:
         """Whether poses of a mapper are stored."""
@@ -203,8 +202,7 @@ class RunFolder:
         """
         poses, map_ = self._file("poses", unit), self._map(unit)
         if made is not None:
-            mapped.write_poses(poses, made, time_s)
-            mapped.write_map(map_, made.map)
+            mapped.write_mapped(poses, map_, made, time_s)
             return
         for path in (poses, map_):
             with disk_errors(path, "removed"):

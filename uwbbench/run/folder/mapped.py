@@ -37,6 +37,33 @@ _GRID: Mapping[str, tuple[str, tuple[int | None, ...]]] = {
 """Kind of number and shape of each array of a map, and of those of its grid, which need not be there."""
 
 
+def write_mapped(poses: Path, map_: Path, made: Mapped, time_s: FloatArray) -> None:
+    """Store poses and map of a mapper.
+
+    Parameters
+    ----------
+    poses, map_ : Path
+        A file each.
+    made : Mapped
+    time_s : (steps,) array
+        Of the run.
+    """
+    write_poses(poses, made, time_s)
+    write_map(map_, made.map)
+
+
+def read_mapped(poses: Path, map_: Path) -> Mapped:
+    """Stored poses and map.
+
+    Raises
+    ------
+    StoreError
+        As :func:`read_poses` and :func:`read_map`.
+    """
+    on_the_way, smoothed = read_poses(poses)
+    return Mapped(on_the_way, read_map(map_), smoothed)
+
+
 def write_poses(path: Path, mapped: Mapped, time_s: FloatArray) -> None:
     """Store the poses of a run, those handed out on the way and the smoothed ones, in one table.
 

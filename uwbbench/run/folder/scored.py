@@ -15,7 +15,7 @@ from uwbbench.api.metric import Metric, Outcome
 from uwbbench.config.rules import RegionModel
 from uwbbench.measure.accuracy.causes import Causes, causes
 from uwbbench.measure.accuracy.metrics.choice import MetricChoice, Metrics
-from uwbbench.measure.accuracy.rules import outcome_of
+from uwbbench.measure.accuracy.rules import has_causes
 from uwbbench.measure.accuracy.scene import Scene
 from uwbbench.measure.accuracy.scoring import Region, ScoringRules, column_of, outcomes, score_scene
 from uwbbench.measure.accuracy.stats import evaluate
@@ -110,8 +110,7 @@ def with_causes(
     by_name = {rule.scoring: rule for rule in rules}
     completed = [dict(row) for row in rows]
     for row in completed:
-        counted = row["scoring"] not in ("latest", "presence") and not outcome_of(row["scoring"]).of_run
-        if row["status"] == "scored" and counted:
+        if row["status"] == "scored" and has_causes(row["scoring"]):
             row[CAUSES] = canonical(causes(detections, scene, by_name[row["scoring"]], row["table"]).to_dict())
     return completed
 

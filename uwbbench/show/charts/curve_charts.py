@@ -35,7 +35,7 @@ def precision_against_recall(title: str, curves: Mapping[str, RankedCurve], name
     names : mapping of str to str
         Labels of detectors.
     """
-    drawn = {name: curve for name, curve in curves.items() if curve.exhaustive and len(curve.score)}
+    drawn = _drawn(curves)
     if not drawn:
         return None
     rows: list[Spec] = [
@@ -61,7 +61,7 @@ def recall_against_false_alarms(title: str, curves: Mapping[str, RankedCurve], n
     names : mapping of str to str
         Labels of detectors.
     """
-    drawn = {name: curve for name, curve in curves.items() if curve.exhaustive and len(curve.score)}
+    drawn = _drawn(curves)
     rates = [curve.false_alarms_per_minute.value for curve in drawn.values()]
     rates += [np.atleast_1d(curve.setting["false_alarms_per_minute"].value) for curve in drawn.values()]
     some = np.concatenate([*rates, np.empty(0)])
@@ -83,6 +83,15 @@ def recall_against_false_alarms(title: str, curves: Mapping[str, RankedCurve], n
     return chart(
         title, SUBTITLE, _layers(Series(names, [row["detector"] for row in rows]), x, y, points), data={"values": rows}
     )
+
+
+def _drawn(curves: Mapping[str, RankedCurve]) -> dict[str, RankedCurve]:
+    """Curves on captures whose truth is whole, of scored detections, where there was anything to find."""
+    return {
+        name: curve
+        for name, curve in curves.items()
+        if curve.exhaustive and len(curve.score) and not np.isnan(curve.recall.value).all()
+    }
 
 
 def _steps(curve: RankedCurve, across: Interval, up: Interval) -> list[tuple[float, float, str]]:

@@ -175,11 +175,8 @@ def _place(low: FloatArray, high: FloatArray) -> Spec:
     half = f"max({span_x:.4g} / width, {span_y:.4g} / height) / 2"
     made = {}
     for name, size, middle in zip("xy", ("width", "height"), ((low + high) / 2).tolist(), strict=True):
-        ends = {
-            "domainMin": {"expr": f"{middle:.4g} - {size} * {half}"},
-            "domainMax": {"expr": f"{middle:.4g} + {size} * {half}"},
-        }
-        made[name] = axis(name, f"{name} (m)", scale={**ends, "nice": False, "zero": False})
+        ends = [{"expr": f"{middle:.4g} {sign} {size} * {half}"} for sign in "-+"]
+        made[name] = axis(name, f"{name} (m)", scale={"domain": ends, "nice": False, "zero": False})
     return made
 
 

@@ -138,7 +138,7 @@ def _poses(plain: Outcome) -> PoseOutcome:
         aligned_m=np.abs(off_m),
         start_m=2 * np.abs(off_m),
         heading_rad=off_m,
-        nees=3 + off_m**2,
+        nees=3 + 20 * off_m**2,
         nearest_m=np.stack([off_m, off_m], axis=1) / 2,
         pair_frame=rows[:-1],
         moved_m=np.abs(off_m[1:]),

@@ -7,6 +7,7 @@ Conventions
 * Against a stored run, the difference on the same captures counts, in pairs
   (:func:`uwbbench.measure.accuracy.stats.paired_difference`): a regression is a loss whose whole interval lies beyond
   the tolerance. Both are judged by the gate's own rules, and captures are recognised by their content.
+* Poses and maps are judged on the runs of a dataset, everything else on its captures.
 * Captures of one dataset are pooled, those of different datasets never.
 """
 
@@ -22,12 +23,14 @@ from typing import Any
 from uwbbench.api import registry
 from uwbbench.api.capture import Capture
 from uwbbench.api.detections import Detections
+from uwbbench.api.drive import Drive
 from uwbbench.api.errors import ScoringError
 from uwbbench.api.metric import Metric, Outcome
-from uwbbench.config.source import CaptureRef
+from uwbbench.config.source import CaptureRef, RunRef
 from uwbbench.measure.accuracy.rules import outcome_of
 from uwbbench.measure.accuracy.scoring import Region, ScoringRules, outcomes
 from uwbbench.measure.accuracy.stats import Estimate, estimated, paired_difference
+from uwbbench.run.folder.mapped import read_mapped
 from uwbbench.run.folder.tables import read_detections
 from uwbbench.tools.gate.check import Check, GateVerdict
 from uwbbench.tools.gate.config import AccuracyModel, Gate
@@ -41,7 +44,7 @@ class Found:
 
     Attributes
     ----------
-    capture : Capture
+    capture : Capture or Drive
     sha256 : str
         Of its content.
     detections : Detections
@@ -49,14 +52,14 @@ class Found:
         Scene or set-up that the capture is of.
     """
 
-    capture: Capture
+    capture: Capture | Drive
     sha256: str
     detections: Detections
     scene: str
 
 
-def found_on(gate: Gate, worker: Worker, ref: CaptureRef, scene: str) -> Found:
-    """Run the head on a capture.
+def found_on(gate: Gate, worker: Worker, ref: CaptureRef | RunRef, scene: str) -> Found:
+    """Run the head on a capture, or on a run.
 
     Parameters
     ----------
@@ -64,7 +67,7 @@ def found_on(gate: Gate, worker: Worker, ref: CaptureRef, scene: str) -> Found:
         Its accuracy rules decide whether the peaks before the filters, and the times of hand-out, are wanted too.
     worker : Worker
         In the environment of the head.
-    ref : CaptureRef
+    ref : CaptureRef or RunRef
     scene : str
         Scene that the capture is of.
 
@@ -82,7 +85,11 @@ def found_on(gate: Gate, worker: Worker, ref: CaptureRef, scene: str) -> Found:
         path = Path(folder) / "detections.parquet"
         answer = detect(worker, gate.head, ref, candidates=candidates, handed_out=handed_out, to=path)
         before_filters = path.with_suffix(".candidates.parquet")
-        detections = read_detections(path, before_filters if candidates else None)
+        of_run = isinstance(ref, RunRef)
+        detections = read_detections(path, before_filters if candidates and not of_run else None)
+        if of_run:
+            made = read_mapped(path.with_suffix(".poses.parquet"), path.with_suffix(".map.npz"))
+            detections = detections.annotated(mapped=made)
     if answer["sha256"] != capture.sha256:
         raise SetUpError(f"capture '{ref.name}' has another content in the environment of the head")
     return Found(capture, capture.sha256, detections, scene)
@@ -106,7 +113,7 @@ def accuracy_check(gate: Gate, rule: AccuracyModel, label: str, found: list[Foun
     ScoringError, StoreError, ConfigError
         If nothing can be said: there is no truth, or the stored run is not what it should be.
     """
-    source = ", SIMULATED" if any(one.capture.source == "simulated" for one in found) else ""
+    source = ", SIMULATED" if any(one.capture.header.source == "simulated" for one in found) else ""
     metric: type[Metric] = registry.load_plugin("metrics", rule.metric)
     title = metric.title or rule.metric
     name = f"{title} ({rule.scoring} scoring, {rule.table}) on {label}{source}"
@@ -136,12 +143,13 @@ def _name_of(gate: Gate) -> str:
     return read_detector(gate.head.detector, None, gate.head.set).name
 
 
-def _outcome(gate: Gate, rule: AccuracyModel, capture: Capture, found: Detections) -> Outcome:
+def _outcome(gate: Gate, rule: AccuracyModel, capture: Capture | Drive, found: Detections) -> Outcome:
     region = Region(**gate.model.region.limits)
     rules = ScoringRules(rule.scoring, gate.model.gate_m, region, gate.model.strongest)
     tables = outcomes(found, capture.header, rules)
     if rule.table not in tables:
-        raise ScoringError(f"capture '{capture.name}': nothing after mapping: the detector does not cluster positions")
+        why = "does not look back" if outcome_of(rule.scoring).of_run else "does not cluster positions"
+        raise ScoringError(f"capture '{capture.name}': nothing after mapping: the detector {why}")
     return tables[rule.table]
 
 

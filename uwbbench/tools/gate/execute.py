@@ -10,7 +10,8 @@ from time import perf_counter
 from uwbbench.api.errors import UwbbenchError
 from uwbbench.api.interruption import by_plugin
 from uwbbench.config.detector import read_detector
-from uwbbench.config.source import CaptureRef
+from uwbbench.config.source import CaptureRef, RunRef
+from uwbbench.measure.accuracy.rules import outcome_of
 from uwbbench.measure.latency.machine import machine
 from uwbbench.run.leaks import refuse_trained_on
 from uwbbench.run.plan import reason_of
@@ -48,8 +49,10 @@ def run_gate(gate: Gate, progress: Progress = lambda _: None) -> GateResult:
     listed = _listed(gate, checks)
     _refuse_trained_on(gate, listed)
     model = gate.model
+    runs = _runs_of(gate, listed)
     for label, refs in listed.items():
-        checks += _accuracy(gate, label, refs, progress)
+        checks += _accuracy(gate, label, refs, progress, of_runs=False)
+        checks += _accuracy(gate, label, runs.get(label, ()), progress, of_runs=True)
     if model.deadline is not None:
         deadline = model.deadline
         for label, ref in _timed(listed, deadline.captures):
@@ -77,6 +80,15 @@ def _listed(gate: Gate, checks: list[Check]) -> dict[str, list[tuple[CaptureRef,
     return listed
 
 
+def _runs_of(gate: Gate, listed: Listed) -> dict[str, list[tuple[RunRef, str]]]:
+    """Runs of each dataset that was listed, each of a scene of its own; none where nothing is asked of runs."""
+    if not any(outcome_of(rule.scoring).of_run for rule in gate.model.accuracy):
+        return {}
+    return {
+        source.label: [(run, run.name) for run in source.runs()] for source in gate.datasets if source.label in listed
+    }
+
+
 def _refuse_trained_on(gate: Gate, listed: Listed) -> None:
     """Refuse a head of this environment that was trained on captures on which its accuracy would be judged."""
     if not gate.model.accuracy or gate.head.python is not None:
@@ -94,9 +106,12 @@ def _timed(listed: Listed, captures: Captures) -> list[tuple[str, CaptureRef]]:
     ]
 
 
-def _accuracy(gate: Gate, label: str, refs: Sequence[tuple[CaptureRef, str]], progress: Progress) -> list[Check]:
-    """All limits of one dataset."""
+def _accuracy(
+    gate: Gate, label: str, refs: Sequence[tuple[CaptureRef | RunRef, str]], progress: Progress, *, of_runs: bool
+) -> list[Check]:
+    """All limits of one dataset that are of its runs, or of its captures."""
     rules = [rule for rule in gate.model.accuracy if rule.dataset in (None, label)]
+    rules = [rule for rule in rules if outcome_of(rule.scoring).of_run == of_runs]
     if not rules:
         return []
     progress(f"accuracy on {label}")

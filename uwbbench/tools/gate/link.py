@@ -15,7 +15,7 @@ from types import TracebackType
 from typing import Any, Self
 
 from uwbbench.api.errors import UwbbenchError
-from uwbbench.config.source import CaptureRef
+from uwbbench.config.source import CaptureRef, RunRef
 from uwbbench.measure.latency.launch import ONE_THREAD
 from uwbbench.tools.gate.config import Side
 from uwbbench.tools.gate.worker import PROTOCOL
@@ -182,15 +182,15 @@ def join(worker: Worker, player: str, side: Side, ref: CaptureRef, frames: int, 
 
 
 def detect(
-    worker: Worker, side: Side, ref: CaptureRef, *, candidates: bool, handed_out: bool, to: Path
+    worker: Worker, side: Side, ref: CaptureRef | RunRef, *, candidates: bool, handed_out: bool, to: Path
 ) -> dict[str, Any]:
-    """Run a side's detector on a whole capture in a worker; detections go into a file.
+    """Run a side's detector on a whole capture, or its mapper on a run, in a worker; what it finds goes into files.
 
     Parameters
     ----------
     worker : Worker
     side : Side
-    ref : CaptureRef
+    ref : CaptureRef or RunRef
     candidates : bool
         Whether to write the peaks before the filters too, next to the detections as ``*.candidates.parquet``.
     handed_out : bool

@@ -116,18 +116,19 @@ class Session:
     def detect(
         self, detector: dict[str, Any], capture: dict[str, Any], candidates: bool, handed_out: bool, to: str
     ) -> dict[str, Any]:
-        """Run a detector on a whole capture; detections, and the peaks before its filters, go into files.
+        """Run a detector on a whole capture, or a mapper on a run; what it finds goes into files.
 
         Parameters
         ----------
         detector, capture : dict
-            As in :meth:`join`.
+            As in :meth:`join`; of a run with the names of its ``captures``.
         candidates : bool
             Whether to write the peaks before the filters too, next to the detections as ``*.candidates.parquet``.
         handed_out : bool
             Whether to find out after which frame each detection is handed out.
         to : str
-            Parquet file for the detections.
+            Parquet file for the detections. Poses and map of a mapper are next to it, as ``*.poses.parquet`` and
+            ``*.map.npz``.
 
         Returns
         -------
@@ -136,12 +137,30 @@ class Session:
         """
         from uwbbench.run.folder.tables import write_detections
 
+        if "captures" in capture:
+            return _mapped(detector, capture, handed_out, Path(to))
         opened = _opened(capture)
         detections = _loaded(detector).run(opened, candidates=candidates, handed_out=handed_out)
         write_detections(Path(to), detections)
         if candidates and detections.candidates is not None:
             write_detections(Path(to).with_suffix(".candidates.parquet"), detections.candidates)
         return {"sha256": opened.sha256, "frames": len(opened)}
+
+
+def _mapped(detector: dict[str, Any], run: dict[str, Any], handed_out: bool, to: Path) -> dict[str, Any]:
+    """Answer of a mapper on a run, which goes into files."""
+    from uwbbench.config.source import RunRef
+    from uwbbench.detect.mapping import load_mapper
+    from uwbbench.run.folder.mapped import write_mapped
+    from uwbbench.run.folder.tables import write_detections
+
+    names = {name: tuple(run[name]) for name in ("roots", "captures")}
+    drive = RunRef(**{**run, **names}).open()
+    found = load_mapper(detector["use"], changes=detector["set"]).run(drive, handed_out=handed_out)
+    write_detections(to, found)
+    assert found.mapped is not None  # noqa: S101 - of a mapper
+    write_mapped(to.with_suffix(".poses.parquet"), to.with_suffix(".map.npz"), found.mapped, drive.time_s)
+    return {"sha256": drive.sha256, "frames": len(drive)}
 
 
 def _opened(capture: dict[str, Any]) -> Capture:

@@ -193,7 +193,8 @@ class NeesInside(_PoseMetric):
 class NearestRmse(_PoseMetric):
     """What the published script of LP_SLAM calls the RMSE: to the nearest true position, of any moment, and per axis.
 
-    Never to be read in place of the ATE, of which it is a fraction: it does not see errors along the path.
+    Never to be read in place of the ATE: it does not see errors along the path, and takes the nearest positions before
+    it lays the trajectories over each other.
     """
 
     title: ClassVar[str] = "nearest RMSE"

@@ -37,6 +37,8 @@ def regions(start: IntArray, corner: IntArray, shape: IntArray, count: int) -> t
         to 0. ``cell`` is the flat index of a box's corner, the last axis running fastest.
     """
     axes = len(shape)
+    none = 0 * axes  # what is called with a plain number is compiled for it alone
+    one = none + 1
     cells = 1
     stride = np.empty(axes, np.int64)
     for axis in range(axes - 1, -1, -1):
@@ -64,14 +66,16 @@ def regions(start: IntArray, corner: IntArray, shape: IntArray, count: int) -> t
                 own += corner[peak, axis] * stride[axis]
             change[own] = 1
             touched[0] = own
-            many = 1
+            many = one
             if count > 0:
-                many = _meet(corner[peak], weight[count], listed[count], length[count], -1, coordinate, stride,
+                many = _meet(corner[peak], weight[count], listed[count], length[count], -one, coordinate, stride,
                              change, touched, many)  # fmt: skip
             if made + many > room:
                 room = 2 * (room + many)
                 larger = np.empty((3, room), np.int64)
-                larger[:, :made] = terms[:, :made]
+                for row in range(3):
+                    for place in range(made):
+                        larger[row, place] = terms[row, place]
                 terms = larger
             before = made
             for place in range(many):
@@ -83,9 +87,9 @@ def regions(start: IntArray, corner: IntArray, shape: IntArray, count: int) -> t
             if made == before:  # at least ``count`` stronger peaks pass wherever this one does
                 continue
             for level in range(count, 0, -1):
-                many = _meet(corner[peak], weight[level - 1], listed[level - 1], length[level - 1], 1, coordinate,
-                             stride, change, touched, 0)  # fmt: skip
-                many = _meet(corner[peak], weight[level], listed[level], length[level], -1, coordinate, stride,
+                many = _meet(corner[peak], weight[level - 1], listed[level - 1], length[level - 1], one, coordinate,
+                             stride, change, touched, none)  # fmt: skip
+                many = _meet(corner[peak], weight[level], listed[level], length[level], -one, coordinate, stride,
                              change, touched, many)  # fmt: skip
                 length[level] = _merge(weight[level], listed[level], length[level], change, touched, many)
         for level in range(1, count + 1):
