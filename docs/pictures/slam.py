@@ -54,4 +54,3 @@ def _draw(axes: Axes, drive: Drive, mapped: Mapped) -> None:
         center = turn @ (place - middle) + true_middle
         axes.add_patch(Ellipse(tuple(center), width, height, angle=angle, fill=False, color="tab:orange"))
         axes.plot(*center, ".", color="tab:orange", markersize=3)
-
