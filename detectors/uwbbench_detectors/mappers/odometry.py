@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from pydantic import Field
+
 from uwbbench.api import Map, Mapper, Params, Poses, Radar, Step
 from uwbbench_detectors.mappers.ekf import Ekf
 from uwbbench_detectors.mappers.motion import MotionParams
@@ -13,7 +15,7 @@ from uwbbench_detectors.mappers.reckoning import Reckoning
 class OdometryParams(Params):
     """How odometry errs, which decides the covariance of the poses and nothing else."""
 
-    motion: MotionParams = MotionParams.model_validate({})
+    motion: MotionParams = Field(MotionParams.model_validate({}), description="How odometry errs.")
 
 
 class OdometryAlone(Mapper[OdometryParams]):

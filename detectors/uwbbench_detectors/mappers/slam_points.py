@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import ClassVar
 
+from pydantic import Field
+
 from uwbbench.api import Map, Mapper, Poses, Radar, Step, ports
 from uwbbench_detectors.mappers.ekf import Ekf
 from uwbbench_detectors.mappers.motion import MotionParams
@@ -21,7 +23,7 @@ DIVERGED = (
 class SlamPointsParams(PointsParams):
     """How points are gathered, told apart, and believed, and how odometry errs."""
 
-    motion: MotionParams = MotionParams.model_validate({})
+    motion: MotionParams = Field(MotionParams.model_validate({}), description="How odometry errs.")
 
 
 class SlamPoints(Mapper[SlamPointsParams]):
