@@ -77,7 +77,16 @@ class Logbook(Ekf):
         self._index = index
 
     def predict(self, moved: FloatArray) -> None:
-        """As the filter does, and log it."""
+        """As the filter does, and log it.
+
+        Parameters
+        ----------
+        model : Model
+        measured : (k,) array
+        noise : (k, k) array
+        number : int, optional
+            By which the map calls it.
+        """
         super().predict(moved)
         self._leg.add(self.motion, moved)
 
@@ -87,7 +96,17 @@ class Logbook(Ekf):
         self._leg.noise = self._leg.noise + covariance
 
     def update(self, model: Model, handle: int, measured: FloatArray, noise: FloatArray, **how: Any) -> float:
-        """As the filter does, and log it."""
+        """As the filter does, and log it.
+
+        Parameters
+        ----------
+        model : Model
+        handle : int
+        measured : (k,) array
+        noise : (k, k) array
+        **how
+            As of the filter.
+        """
         self._log(handle, measured, noise)
         return super().update(model, handle, measured, noise, **how)
 
@@ -98,7 +117,15 @@ class Logbook(Ekf):
         return handle
 
     def merge(self, kept: int, dropped: int, noise: FloatArray) -> None:
-        """As the filter does, and log it."""
+        """As the filter does, and log it.
+
+        Parameters
+        ----------
+        kept, dropped : int
+            Handles.
+        noise : (2, 2) array
+            Which the graph leaves out: there the two are one.
+        """
         super().merge(kept, dropped, noise)
         self._merged[dropped] = kept
 
