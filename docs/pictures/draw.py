@@ -39,6 +39,11 @@ def main(folder: Path) -> None:
     coupling.main(folder / "coupling.png")
     still_robot.main(folder / "still-robot.png")
     walk.main(folder)
+    bat_room.main(folder)
+    slam.main(folder)
+    loops.main(folder)
+    subprocess.run([sys.executable, HERE / "segments.py"], check=True)  # noqa: S603 - our own
+    names = ("radargram", "map", "stable-zone", "coupling", "still-robot", "walker-svd", "kalman-track")
     names += ("slam-points", "slam-lines", "slam-anchors", "slam-graph", "slam-particles")
     for name in (f"{name}.png" for name in names):
         shrink(folder / name, IMAGES / name)
