@@ -108,8 +108,8 @@ class _Track:
 class SlamParticles(Mapper[SlamParticlesParams]):
     """Rao-Blackwellised particle filter over walls and points that two ears hear, by range alone.
 
-    In kind after Zetik et al., Cooperative Localization and Object Recognition in Autonomous UWB Sensor Networks, InTech
-    2013, doi 10.5772/55077, whose text is not known; the filter is FastSLAM (Montemerlo, Thrun, Koller, Wegbreit, AAAI
+    In kind after Zetik et al., Cooperative Localization and Object Recognition in Autonomous UWB Sensor Networks,
+    InTech 2013, doi 10.5772/55077, whose text is not known; the filter is FastSLAM (Montemerlo, Thrun, Koller, Wegbreit, AAAI
     2002), with landmarks that begin when the way has left one direction for them. All numbers are chosen here.
     """
 
