@@ -111,7 +111,13 @@ class Logbook(Ekf):
         return super().update(model, handle, measured, noise, **how)
 
     def add(self, model: Model, measured: FloatArray, noise: FloatArray, number: int | None = None) -> int:
-        """As the filter does, and log it."""
+        """As the filter does, and log it.
+
+        Parameters
+        ----------
+        model, measured, noise, number
+            As of the filter.
+        """
         handle = super().add(model, measured, noise, number)
         self._log(handle, measured, noise)
         return handle
