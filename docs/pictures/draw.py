@@ -7,6 +7,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import bat_room
 import coupling
 import loops
 import slam
@@ -38,11 +39,12 @@ def main(folder: Path) -> None:
     coupling.main(folder / "coupling.png")
     still_robot.main(folder / "still-robot.png")
     walk.main(folder)
+    bat_room.main(folder)
     slam.main(folder)
     loops.main(folder)
     subprocess.run([sys.executable, HERE / "segments.py"], check=True)  # noqa: S603 - our own
-    names = ("radargram", "map", "stable-zone", "coupling", "still-robot", "walker-svd", "kalman-track", "slam-points")
-    names += ("slam-anchors", "slam-graph")
+    names = ("radargram", "map", "stable-zone", "coupling", "still-robot", "walker-svd", "kalman-track")
+    names += ("slam-points", "slam-lines", "slam-anchors", "slam-graph", "slam-particles")
     for name in (f"{name}.png" for name in names):
         shrink(folder / name, IMAGES / name)
     (IMAGES / "examples").mkdir(exist_ok=True)

@@ -1,4 +1,4 @@
-"""Draw what slam-points makes of a simulated run: odometry, its own poses and map, and the truth."""
+"""Draw what mappers make of a simulated run: odometry, their own poses and map, and the truth."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Ellipse
 
 import uwbbench
-from uwbbench.api import Drive, Mapped
+from uwbbench.api import Drive, FloatArray, Landmarks, Mapped
 from uwbbench.detect.mapping import load_mapper
 from uwbbench.show.figures.style import caption, figure, save, styled
 
@@ -19,19 +19,25 @@ SIGMAS = 2.45
 
 
 def main(folder: Path) -> None:
-    """Draw the picture into a folder."""
+    """Draw the pictures into a folder."""
     dataset = uwbbench.open_dataset("simulated", {"scenes": [SCENE], "seed": 7001})
     drive = dataset.open_run(RUN, dataset.runs()[RUN])
+    _compare(folder / "slam-points.png", drive, ("odometry", "slam-points"))
+    _compare(folder / "slam-lines.png", drive, ("odometry", "slam-lines"))
+
+
+def _compare(path: Path, drive: Drive, names: tuple[str, str]) -> None:
+    """Two detectors beside each other."""
     with styled():
         drawn = figure(7.2, 3.6)
-        for axes, name in zip(drawn.subplots(1, 2, sharey=True), ("odometry", "slam-points"), strict=True):
+        for axes, name in zip(drawn.subplots(1, 2, sharey=True), names, strict=True):
             mapped = load_mapper(name).run(drive).mapped
             assert mapped is not None  # noqa: S101 - what a mapper's detector gives
             _draw(axes, drive, mapped)
             axes.set(title=name, xlabel="x (m)", aspect="equal")
         drawn.axes[0].set_ylabel("y (m)")
         caption(drawn, [f"SIMULATED: {RUN}, seed 7001."])
-        save(drawn, folder / "slam-points.png")
+        save(drawn, path)
 
 
 def _draw(axes: Axes, drive: Drive, mapped: Mapped) -> None:
@@ -46,7 +52,15 @@ def _draw(axes: Axes, drive: Drive, mapped: Mapped) -> None:
     left, _, right = np.linalg.svd((places - middle).T @ (truth - true_middle))
     turn = (left @ np.diag([1, np.sign(np.linalg.det(left @ right))]) @ right).T
     axes.plot(*((places - middle) @ turn.T + true_middle).T, color="tab:blue", linewidth=0.8)
-    landmarks = mapped.map.landmarks
+    for segment in mapped.map.segments_m:
+        axes.plot(*((segment - middle) @ turn.T + true_middle).T, color="tab:orange", linewidth=1.5)
+    points = [mapped.map.landmarks.of(kind) for kind in ("point", "anchor")]
+    for landmarks in points:
+        _ellipses(axes, landmarks, turn, middle, true_middle)
+
+
+def _ellipses(axes: Axes, landmarks: Landmarks, turn: FloatArray, middle: FloatArray, true_middle: FloatArray) -> None:
+    """Landmarks that have places, moved as the trajectory is."""
     for place, covariance in zip(landmarks.position_m, landmarks.covariance, strict=True):
         sizes, axes_of = np.linalg.eigh(turn @ covariance @ turn.T)
         width, height = 2 * SIGMAS * np.sqrt(sizes)

@@ -18,6 +18,7 @@ PARTS = {
     "dbscan": "bench_dbscan",
     "cfar": "bench_cfar_clutter",
     "tracks": "bench_tracks",
+    "particles": "bench_particles",
     "mappers": "bench_mappers",
     "sweep": "bench_sweep",
     "classify": "bench_classify",

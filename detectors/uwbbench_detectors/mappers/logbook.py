@@ -77,7 +77,16 @@ class Logbook(Ekf):
         self._index = index
 
     def predict(self, moved: FloatArray) -> None:
-        """As the filter does, and log it."""
+        """As the filter does, and log it.
+
+        Parameters
+        ----------
+        model : Model
+        measured : (k,) array
+        noise : (k, k) array
+        number : int, optional
+            By which the map calls it.
+        """
         super().predict(moved)
         self._leg.add(self.motion, moved)
 
@@ -106,11 +115,8 @@ class Logbook(Ekf):
 
         Parameters
         ----------
-        model : Model
-        measured : (k,) array
-        noise : (k, k) array
-        number : int, optional
-            By which the map calls it.
+        model, measured, noise, number
+            As of the filter.
         """
         handle = super().add(model, measured, noise, number)
         self._log(handle, measured, noise)

@@ -20,8 +20,8 @@ from uwbbench_detectors.mappers.window import Window, WindowParams
 class PointsParams(Params):
     """How points are gathered, told apart, and believed."""
 
-    window: WindowParams = Field(WindowParams.model_validate({}), description="How points are gathered.")
-    evidence: EvidenceParams = Field(EvidenceParams.model_validate({}), description="What makes a landmark of them.")
+    window: WindowParams = Field(WindowParams.model_validate({}), description="How echoes gather along the way.")
+    evidence: EvidenceParams = Field(EvidenceParams.model_validate({}), description="When a landmark is believed.")
     range_sd_m: float = Field(0.045, gt=0, description="Standard deviation of the range of a cluster of points.")
     bearing_sd_deg: float = Field(4.5, gt=0, description="Standard deviation of its bearing.")
     spread_m: float = Field(

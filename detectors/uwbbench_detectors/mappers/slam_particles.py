@@ -36,6 +36,8 @@ COLLAPSED = 0.1
 """Share of the particles below which their effective number says that they disagree with all that is heard."""
 WORST = 1.0
 """Largest mean squared residual, in standard deviations, of the readings that a landmark begins with."""
+FORGOTTEN_M = 2.0
+"""Way after which a track that was not read is forgotten."""
 LONGEST = 40
 """Readings that are kept of a track that no landmark explains."""
 
@@ -104,7 +106,13 @@ class _Track:
 
 
 class SlamParticles(Mapper[SlamParticlesParams]):
-    """Rao-Blackwellised particle filter over walls and points that two ears hear, by range alone."""
+    """Rao-Blackwellised particle filter over walls and points that two ears hear, by range alone.
+
+    In kind after Zetik et al., Cooperative Localization and Object Recognition in Autonomous UWB Sensor Networks,
+    InTech 2013, doi 10.5772/55077, whose text is not known; the filter is FastSLAM (Montemerlo, Thrun, Koller,
+    Wegbreit, AAAI 2002), with landmarks that begin when the way has left one direction for them. All numbers are
+    chosen here.
+    """
 
     consumes = ports("range_m", "track")
     receivers = 2
@@ -163,7 +171,13 @@ class SlamParticles(Mapper[SlamParticlesParams]):
         for row in places.tolist():
             if rows["track"][row] < 0:
                 continue
-            track = self._tracks.setdefault((name, int(rows["track"][row])), _Track())
+            key = (name, int(rows["track"][row]))
+            if key not in self._tracks:
+                # A track that has not been read for so long has ended.
+                ended = self._way_m - FORGOTTEN_M
+                self._tracks = {known: one for known, one in self._tracks.items() if one.read_at_m >= ended}
+                self._tracks[key] = _Track()
+            track = self._tracks[key]
             if self._way_m - track.read_at_m < p.read_m:
                 continue
             track.read_at_m = self._way_m
@@ -283,11 +297,8 @@ class SlamParticles(Mapper[SlamParticlesParams]):
         """Draw particles anew, with all that each knows."""
         chosen: IntArray = self._particles.resample(weight)
         self._known.resample(chosen)
-        for key, track in list(self._tracks.items()):
-            if self._way_m - track.read_at_m > 2.0:
-                del self._tracks[key]  # it has ended, or else it would have been read
-            else:
-                track.placed = [placed[:, chosen] for placed in track.placed]
+        for track in self._tracks.values():
+            track.placed = [placed[:, chosen] for placed in track.placed]
 
     def _turned(self, covariance: FloatArray) -> FloatArray:
         """Covariance of a pose in the frame of the start pose, in the frame of the run."""

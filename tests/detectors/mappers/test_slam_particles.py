@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from uwbbench.api import ConfigError, Detections, Poses, Radar, Step, bistatic_range, wrap_angle
+from uwbbench_detectors.mappers.landmark_table import AA, BB, HIGH, LOW, SUPPORT, WALL, A
 from uwbbench_detectors.mappers.slam_particles import SlamParticles, SlamParticlesParams
 
 WALLS = np.array([[2.5, 0.0], [2.0, np.pi / 2], [2.5, np.pi], [2.0, -np.pi / 2]])
@@ -76,15 +77,13 @@ def ranges(radar, pose):
     return np.where(np.abs(wrap_angle(WALLS[:, 1] - pose[2] - radar.mount_yaw_rad)) < np.radians(80), found, np.nan)
 
 
-def heard(poses, sd_m=0.0, share=1.0, seed=0, swapped_from=None):
+def heard(poses, sd_m=0.0, share=1.0, seed=0):
     """Tracks of both ears in each step, one a wall; with errors, and only a share of them."""
     rng, steps = np.random.default_rng(seed), []
     for index, pose in enumerate(poses):
         found = {}
         for name, radar in EARS.items():
             range_m = ranges(radar, pose) + sd_m * rng.standard_normal(4)
-            if swapped_from is not None and index >= swapped_from:
-                range_m = range_m + 0.2 * np.array([1, -1, 1, -1])
             kept = np.flatnonzero(np.isfinite(range_m) & (rng.random(4) < share))
             rows = {"range_m": range_m[kept], "track": kept.astype(float), "amplitude": np.ones(len(kept))}
             found[name] = Detections(np.full(len(kept), index), **rows)
@@ -140,11 +139,16 @@ def test_a_room_brings_a_robot_within_20_cm_whose_odometry_is_off_by_more_than_3
     assert notes == []
 
 
-@pytest.mark.slow
-def test_ranges_of_wrong_walls_are_noted():
-    truth, moved = drifting()
-    *_, notes = mapped(moved, heard(truth, sd_m=0.03, swapped_from=len(truth) // 2), start=truth[0], **DRIFT)
-    assert any("particles agree" in note for note in notes)
+@pytest.mark.parametrize(("range_m", "noted"), [(3.0, False), (2.2, True)])
+def test_a_range_of_a_wrong_wall_is_noted(range_m, noted):
+    mapper = SlamParticles(SlamParticlesParams.model_validate({"clutter": 0.001, "motion": {"along_sd_m": 0.3}}))
+    mapper.open(EARS, Poses.of_one(0, np.zeros(3), np.zeros((3, 3))))
+    wall = np.zeros((8, 150))
+    wall[[A, AA, BB, LOW, HIGH, SUPPORT]] = np.array([4.0, 1e-6, 1e-6, -2.0, 2.0, 50.0])[:, None]
+    mapper._known.add(WALL, wall)
+    found = {"left": Detections(np.zeros(1, int), range_m=[range_m], track=[0.0], amplitude=[1.0])}
+    mapper.step(Step(0, 0.0, np.array([1.0, 0.0, 0.0]), found))
+    assert any("particles agree" in note for note in mapper.notes) == noted
 
 
 def test_poses_move_with_the_start_pose():

@@ -172,7 +172,7 @@ def _echoes(axes: Axes, drive: MappedDrive) -> tuple[str, Any]:
     if not len(shown):
         return "", None
     axes.plot(*shown.T, ".", color=style.SKY, ms=1.5, mew=0, alpha=0.5, zorder=1)
-    return f"found by the front ends ({len(place_m)})", axes.plot([], [], ".", color=style.SKY, ms=5, mew=0)[0]
+    return f"detections ({len(place_m)})", axes.plot([], [], ".", color=style.SKY, ms=5, mew=0)[0]
 
 
 def _map(axes: Axes, drive: MappedDrive) -> list[tuple[str, Any]]:
