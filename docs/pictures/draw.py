@@ -45,7 +45,7 @@ def main(folder: Path) -> None:
     subprocess.run([sys.executable, HERE / "segments.py"], check=True)  # noqa: S603 - our own
     names = ("radargram", "map", "stable-zone", "coupling", "still-robot", "walker-svd", "kalman-track")
     names += ("slam-points", "slam-lines", "slam-anchors", "slam-graph", "slam-particles")
-    for name in (f"{name}.png" for name in names):
+    for name in (f"{name}.png" for name in names if (folder / f"{name}.png").is_file()):
         shrink(folder / name, IMAGES / name)
     (IMAGES / "examples").mkdir(exist_ok=True)
     for script in sorted((HERE.parents[1] / "examples").glob("*.py")):
