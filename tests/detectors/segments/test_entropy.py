@@ -31,8 +31,9 @@ def complex_noise(shape, seed=0):
     return (rng.normal(size=shape) + 1j * rng.normal(size=shape)) / np.sqrt(2)
 
 
-def shaped_noise(frames, taps, bandwidth=0.4992, rolloff=0.25):
+def shaped_noise(shape, bandwidth=0.4992, rolloff=0.25):
     """Noise behind a root-raised-cosine filter; the bandwidth is in cycles a tap."""
+    frames, taps = shape
     white = complex_noise((frames, 64), seed=1)
     off = np.abs(np.fft.fftfreq(64)) / bandwidth - (1 - rolloff) / 2
     power = np.where(off <= 0, 1.0, np.where(off <= rolloff, 0.5 * (1 + np.cos(np.pi / rolloff * off)), 0.0))
@@ -92,12 +93,13 @@ def test_segments_are_those_of_a_plain_loop(make_segments, make_echoes, estimato
 
 @pytest.mark.parametrize(
     ("noise", "rate"),
-    [(complex_noise((20_000, 50)), RATE_OF_WHITE_NOISE), (shaped_noise(20_000, 50), RATE_OF_SHAPED_NOISE)],
+    [(complex_noise, RATE_OF_WHITE_NOISE), (shaped_noise, RATE_OF_SHAPED_NOISE)],
     ids=["white", "shaped by the radar's filter"],
 )
 def test_frames_of_noise_have_segments_at_the_documented_rate(make_segments, noise, rate):
-    found = make_segments(noise)
-    assert len(np.unique(found.frame)) / len(noise) == pytest.approx(rate, abs=0.003)
+    samples = noise((20_000, 50))
+    found = make_segments(samples)
+    assert len(np.unique(found.frame)) / len(samples) == pytest.approx(rate, abs=0.003)
 
 
 def test_no_frame_of_noise_reaches_a_threshold_out_of_reach(make_segments):

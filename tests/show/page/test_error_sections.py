@@ -3,7 +3,6 @@
 import dataclasses
 import math
 
-import altair
 import numpy as np
 import pytest
 
@@ -21,6 +20,8 @@ def charts(content: Content) -> list[Spec]:
 
 @pytest.mark.slow
 def test_every_chart_is_a_valid_specification_that_says_simulated(charts: list[Spec]) -> None:
+    import altair  # slow to load
+
     assert len(charts) == 3
     for chart in charts:
         altair.Chart.from_dict(chart)

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from tests.fixtures.shipped import PIPELINES
 from uwbbench.api import ConfigError, registry
 from uwbbench.api.filters import LimitFilter
-from uwbbench.api.locate import shipped
 from uwbbench.detect.pipeline import load_detector
 from uwbbench.tools.tune.sweep.sweep import Sweep
 
@@ -24,13 +24,15 @@ def thresholds(detector, capture):
     return dict(list(grid.items())[:3])
 
 
-LIMITED = [
-    name
-    for name in shipped("detectors")
-    if any(step.use in ("filter.snr", "filter.prominence", "filter.width") for step in load_detector(name).config.steps)
-]
+LIMITED = {
+    name: pipeline
+    for name, pipeline in PIPELINES.items()
+    if any(step.use in ("filter.snr", "filter.prominence", "filter.width") for step in pipeline.config.steps)
+}
 COMPARING = [
-    name for name in LIMITED if any(step.use == "select.first_above" for step in load_detector(name).config.steps)
+    name
+    for name, pipeline in LIMITED.items()
+    if any(step.use == "select.first_above" for step in pipeline.config.steps)
 ]
 SWEEPABLE = [name for name in LIMITED if name not in COMPARING]
 
