@@ -12,7 +12,13 @@ from uwbbench.api import ConfigError, StoreError
 from uwbbench.api.registry import AUTHORED_KINDS
 from uwbbench.tools.scaffold import PluginName, write_package
 
-WORDS = {"stage": "clutter.my-own", "detector": "my-detector", "dataset": "my.data", "metric": "rmse2"}
+WORDS = {
+    "stage": "clutter.my-own",
+    "mapper": "slam.my-own",
+    "detector": "my-detector",
+    "dataset": "my.data",
+    "metric": "rmse2",
+}
 
 
 def installed(package: Path, site: Path) -> dict[str, str]:

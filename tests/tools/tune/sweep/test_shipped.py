@@ -27,7 +27,8 @@ def thresholds(detector, capture):
 LIMITED = {
     name: pipeline
     for name, pipeline in PIPELINES.items()
-    if any(step.use in ("filter.snr", "filter.prominence", "filter.width") for step in pipeline.config.steps)
+    if pipeline.config.mapper is None
+    and any(step.use in ("filter.snr", "filter.prominence", "filter.width") for step in pipeline.config.steps)
 }
 COMPARING = [
     name
