@@ -47,7 +47,7 @@ class Learned(Stage[Params]):
 
 @pytest.fixture(scope="module")
 def runs(tmp_path_factory: pytest.TempPathFactory):
-    """The suite on its public captures, and on private ones, all of fixed seeds: one detector in forty loses by chance."""
+    """The suite on its public captures, and on private ones, of fixed seeds: by chance one detector in forty loses."""
     folder = tmp_path_factory.mktemp("halves")
     (folder / "suite.yaml").write_text(SUITE)
     (folder / "learned.yaml").write_text(LEARNED)
