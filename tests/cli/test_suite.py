@@ -55,6 +55,7 @@ def test_seeds_are_drawn_once_and_give_a_private_half_without_files(uwbbench, su
     assert "others may read this seed file (mode 0644)" in refused.stderr
 
 
+@pytest.mark.slow
 def test_a_detector_of_ones_own_takes_the_place_of_the_suites(
     uwbbench, suite: Path, detector: Path, tmp_path: Path
 ) -> None:

@@ -54,6 +54,7 @@ def test_a_gate_without_limits_is_refused():
         uwbbench.gate({"head": "cfar-os", "datasets": [{"use": "approach"}]})
 
 
+@pytest.mark.slow
 def test_a_tuning_from_a_mapping_leaves_detectors_and_a_picture(tmp_path):
     tuning = {
         "detector": "paper-filtering",

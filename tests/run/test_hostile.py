@@ -36,6 +36,7 @@ def test_a_stage_that_asks_the_program_to_end_is_a_failed_unit(
     assert entries["bad"].reason.startswith(ENDS[how])
 
 
+@pytest.mark.slow
 def test_a_stage_that_asks_a_worker_to_end_is_a_failed_unit(
     make_experiment: MakeExperiment, detector_file: DetectorFile, tmp_path: Path, misbehaving: Path
 ) -> None:
