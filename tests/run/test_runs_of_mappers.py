@@ -47,7 +47,7 @@ def made(once: Once) -> Path:
         (folder / "drives.yaml").write_text(reseeded(EXPERIMENT))
         run_experiment(read_experiment(folder / "drives.yaml"), folder / "run", jobs=1)
 
-    return once("drives", make) / "run"
+    return once("runs-of-mappers", make) / "run"
 
 
 @pytest.fixture

@@ -179,7 +179,7 @@ def _direction(kind: int, trail: Trail, sd_m: float, view_rad: float) -> tuple[f
     least = float(cost.min(where=seen & np.isfinite(cost), initial=np.inf))
     if not np.isfinite(least):
         return np.inf, 0.0, np.inf
-    likely = np.where(seen, np.exp(-0.5 * (cost - least)), 0.0)[0]
+    likely = np.exp(-0.5 * np.where(seen, cost - least, np.inf))[0]
     likely /= likely.sum()
     turn = np.sum(likely * np.exp(1j * ALL_ROUND))
     middle = float(np.angle(turn))

@@ -4,10 +4,9 @@ import re
 
 import pytest
 
-from tests.fixtures.shipped import WITH_RANGES
+from tests.fixtures.shipped import OF_CAPTURES, WITH_RANGES
 from uwbbench import load_detector
 from uwbbench.api import PluginError
-from uwbbench.api.locate import shipped
 from uwbbench.measure.robustness import all_cases, case_named, examine
 from uwbbench.measure.robustness.subject import Subject
 
@@ -19,7 +18,7 @@ RANGE = "{use: range}"
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", sorted(shipped("detectors")))
+@pytest.mark.parametrize("name", OF_CAPTURES)
 def test_a_shipped_detector_stands_every_case(name):
     found = examine(load_detector(name))
     assert [(one.check.name, one.found) for one in found.results if one.status == "failed"] == []
