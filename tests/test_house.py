@@ -57,6 +57,7 @@ def plugin_names() -> frozenset[str]:
 
 
 @cache
+@cache
 def parsed(path: Path) -> ast.Module:
     return ast.parse(path.read_text(encoding="utf-8"))
 

@@ -1,12 +1,13 @@
 """Text for people: one line whatever a name holds, and docstrings without markup."""
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from uwbbench.api.text import one_line, printable, summary, without_markup
 
 
+@settings(max_examples=40)
 @given(st.text(), st.integers(3, 40))
 def test_every_name_is_one_printable_line_within_the_length(name, longest):
     assert printable(name).isprintable()
