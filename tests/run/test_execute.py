@@ -242,6 +242,7 @@ def test_the_default_folder_has_a_safe_name(
     assert folder.path.name.startswith("a-b-c-")
 
 
+@pytest.mark.slow
 def test_latency_is_measured_after_accuracy_and_stored_with_every_call(
     make_experiment: MakeExperiment, tmp_path: Path
 ) -> None:
