@@ -44,6 +44,7 @@ if TYPE_CHECKING:
         segments_cross,
         to_world,
         wrap_angle,
+        wrap_one_angle,
     )
     from uwbbench.api.kernel import Kernel
     from uwbbench.api.learning import Assessed, Example, LearnedParams, Trainable, Weights, expect_arrays
@@ -90,6 +91,7 @@ _HOME = {
         "segments_cross",
         "to_world",
         "wrap_angle",
+        "wrap_one_angle",
     ),
     "kernel": ("Kernel",),
     "learning": ("Assessed", "Example", "LearnedParams", "Trainable", "Weights", "expect_arrays"),
@@ -223,6 +225,7 @@ __all__ = [
     "to_world",
     "with_values",
     "wrap_angle",
+    "wrap_one_angle",
     "write_capture",
 ]
 

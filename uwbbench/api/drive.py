@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import hashlib
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
@@ -14,7 +15,7 @@ from uwbbench.api.arrays import FloatArray, IntArray, locked
 from uwbbench.api.capture import Capture, CaptureHeader
 from uwbbench.api.errors import CaptureError
 from uwbbench.api.frames import Frames
-from uwbbench.api.geometry import wrap_angle
+from uwbbench.api.geometry import wrap_angle, wrap_one_angle
 from uwbbench.api.radar import Radar
 from uwbbench.api.truth import Trajectory
 
@@ -164,9 +165,14 @@ def odometry_of(capture: Capture) -> FloatArray:
 
 def compose(pose: FloatArray, moved: FloatArray) -> FloatArray:
     """Pose (3,) that a robot is at after it has moved (3,), forward, leftward and turning, from a pose (3,)."""
-    cosine, sine = np.cos(pose[2]), np.sin(pose[2])
-    x, y = cosine * moved[0] - sine * moved[1], sine * moved[0] + cosine * moved[1]
-    return np.array([pose[0] + x, pose[1] + y, pose[2] + moved[2]])
+    cosine, sine = math.cos(pose[2]), math.sin(pose[2])
+    return np.array(
+        [
+            pose[0] + cosine * moved[0] - sine * moved[1],
+            pose[1] + sine * moved[0] + cosine * moved[1],
+            wrap_one_angle(pose[2] + moved[2]),
+        ]
+    )
 
 
 def relative(start: FloatArray, end: FloatArray) -> FloatArray:

@@ -8,6 +8,8 @@ transmitter over the target to the receiver.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from uwbbench.api.arrays import BoolArray, FloatArray
@@ -25,6 +27,18 @@ def wrap_angle(angle_rad: FloatArray) -> FloatArray:
     """
     wrapped = np.mod(angle_rad + np.pi, 2 * np.pi) - np.pi
     return np.asarray(np.where(wrapped >= np.pi, -np.pi, wrapped))  # the modulo of a tiny negative number rounds up
+
+
+def wrap_one_angle(angle_rad: float) -> float:
+    """A single angle in [-pi, pi), for what is done angle by angle, where arrays cost more than the arithmetic.
+
+    Examples
+    --------
+    >>> wrap_one_angle(np.pi) == -np.pi
+    True
+    """
+    angle = math.remainder(angle_rad, 2 * math.pi)
+    return -math.pi if angle >= math.pi else angle
 
 
 def rotate_z(vectors: FloatArray, yaw_rad: FloatArray | float) -> FloatArray:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any, ClassVar, Generic, Literal, get_args
 
 import numpy as np
@@ -219,10 +219,6 @@ class Mapped:
     poses: Poses
     map: Map
     smoothed: Poses | None = None
-
-    def without_covariance(self) -> Mapped:
-        """The same without what the mapper says of its own errors."""
-        return replace(self, poses=Poses(self.poses.index, self.poses.pose))
 
 
 class Mapper(Generic[P]):

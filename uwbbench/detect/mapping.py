@@ -18,7 +18,6 @@ from typing import Any
 import numpy as np
 
 from uwbbench.api import registry
-from uwbbench.api.anchors import Messages
 from uwbbench.api.arrays import IntArray
 from uwbbench.api.capture import Capture
 from uwbbench.api.detections import RECEIVER, Detections
@@ -95,11 +94,10 @@ class _Receiver:
         columns: dict[str, Any] = {name: values for name, values in rows.columns.items() if name != "frame"}
         return Detections(step[ready], **columns)
 
-    def heard_in(self, step: int) -> Messages:
-        """Messages of a step in which the receiver has a frame."""
-        if self.anchors is None:
-            return Messages.none()
-        return self.anchors.heard_in(int(np.searchsorted(self.steps, step)))
+    def frame_of(self, step: int) -> int | None:
+        """Frame of a step; None where the receiver has none. Looked up in a time that hardly grows with the run."""
+        frame = int(np.searchsorted(self.steps, step))
+        return frame if frame < len(self.steps) and self.steps[frame] == step else None
 
 
 class MapperLoop:
@@ -187,17 +185,17 @@ class MapperLoop:
         steps = np.arange(first, stop)
         found = {receiver.name: receiver.take(stop) for receiver in self._receivers}
         edges = {name: np.searchsorted(rows.frame, np.append(steps, stop)) for name, rows in found.items()}
-        there = {receiver.name: np.isin(steps, receiver.steps) for receiver in self._receivers}
         poses = []
         for at, index in enumerate(steps.tolist()):
             rows, messages = {}, {}
             for receiver in self._receivers:
                 name = receiver.name
-                if there[name][at]:
-                    rows[name] = found[name].take(np.arange(edges[name][at], edges[name][at + 1]))
-                    heard = receiver.heard_in(index)
-                    if len(heard):
-                        messages[name] = heard
+                frame = receiver.frame_of(index)
+                if frame is None:
+                    continue
+                rows[name] = found[name].take(np.arange(edges[name][at], edges[name][at + 1]))
+                if receiver.anchors is not None and len(heard := receiver.anchors.heard_in(frame)):
+                    messages[name] = heard
             time_s, moved = float(self._drive.time_s[index]), self._drive.moved[index]
             poses.append(self.mapper.step(Step(index, time_s, moved, rows, messages)))
         if not self._keep:

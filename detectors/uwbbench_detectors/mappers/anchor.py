@@ -6,8 +6,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from uwbbench.api import FloatArray, LandmarkKind, wrap_angle
-from uwbbench_detectors.mappers.motion import composed
+from uwbbench.api import FloatArray, LandmarkKind, compose, wrap_angle
 from uwbbench_detectors.mappers.point import PointModel
 
 RANGE, AZIMUTH = 0, 1
@@ -58,7 +57,7 @@ class AnchorModel:
 
     def _receiver(self, pose: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Pose (3,) of the receiver, and its derivative (3, 3) by that of the robot."""
-        receiver = composed(pose, self._mount)
+        receiver = compose(pose, self._mount)
         lever = receiver[:2] - pose[:2]
         by_robot = np.eye(3)
         by_robot[0, 2], by_robot[1, 2] = -lever[1], lever[0]

@@ -16,8 +16,8 @@ from typing import Protocol
 
 import numpy as np
 
-from uwbbench.api import LANDMARK_KINDS, FloatArray, IntArray, LandmarkKind, Landmarks
-from uwbbench_detectors.mappers.motion import HEAD, Motion, MotionParams, wrapped
+from uwbbench.api import LANDMARK_KINDS, FloatArray, IntArray, LandmarkKind, Landmarks, wrap_one_angle
+from uwbbench_detectors.mappers.motion import HEAD, Motion, MotionParams
 from uwbbench_detectors.mappers.rest import Rest, places_of
 
 _POSE = np.arange(3)
@@ -333,7 +333,7 @@ class Ekf:
         rows = np.array([first, first + 1, second, second + 1])
         difference = self._mean[first : first + 2] - self._mean[second : second + 2]
         if self._marks[one].kind == "line":
-            difference[1] = wrapped(difference[1])
+            difference[1] = wrap_one_angle(difference[1])
         return rows, difference, np.hstack([np.eye(2), -np.eye(2)])
 
     def _correct(
@@ -371,7 +371,7 @@ class Ekf:
             held[learning] = False
             gain[held] = 0.0
         self._mean += gain @ off
-        self._mean[2] = wrapped(self._mean[2])
+        self._mean[2] = wrap_one_angle(self._mean[2])
         if self._half.shape != self._covariance.shape:
             self._half = np.empty(self._covariance.shape)  # asking for fresh memory takes longer than all the rest
         np.dot(gain, across.T - spread / 2 @ gain.T, out=self._half)

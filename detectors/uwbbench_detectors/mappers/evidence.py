@@ -9,8 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from pydantic import Field
 
-from uwbbench.api import FloatArray, Params, Radar
-from uwbbench_detectors.mappers.motion import wrapped
+from uwbbench.api import FloatArray, Params, Radar, wrap_one_angle
 from uwbbench_detectors.mappers.window import WindowParams
 
 
@@ -97,7 +96,7 @@ class Evidence:
         known = self._support.setdefault(handle, _Support(direction))
         known.seen += 1
         known.seen_at_m = self._travel_m
-        turned = wrapped(direction - known.first_rad)
+        turned = wrap_one_angle(direction - known.first_rad)
         known.least_rad, known.most_rad = min(known.least_rad, turned), max(known.most_rad, turned)
         p = self._params
         parallax = known.most_rad - known.least_rad
@@ -136,7 +135,7 @@ class Evidence:
         for mount_m, yaw_rad in self._mounts:
             ahead, aside = x - mount_m[0], y - mount_m[1]
             range_m = math.hypot(ahead, aside)
-            azimuth_rad = wrapped(math.atan2(aside, ahead) - yaw_rad)
+            azimuth_rad = wrap_one_angle(math.atan2(aside, ahead) - yaw_rad)
             in_range = w.nearest_m + p.margin_m <= range_m <= w.farthest_m - p.margin_m
             if in_range and abs(azimuth_rad) <= math.radians(w.azimuth_deg - p.margin_deg):
                 return True

@@ -77,16 +77,7 @@ class Logbook(Ekf):
         self._index = index
 
     def predict(self, moved: FloatArray) -> None:
-        """As the filter does, and log it.
-
-        Parameters
-        ----------
-        model : Model
-        measured : (k,) array
-        noise : (k, k) array
-        number : int, optional
-            By which the map calls it.
-        """
+        """As the filter does, and log it."""
         super().predict(moved)
         self._leg.add(self.motion, moved)
 

@@ -7,7 +7,7 @@ import math
 import numpy as np
 from pydantic import Field
 
-from uwbbench.api import FloatArray, Params
+from uwbbench.api import FloatArray, Params, wrap_one_angle
 
 HEAD = 5
 """Leading values of a state: x, y, yaw, and by how much odometry is short of distances and of turns."""
@@ -25,24 +25,6 @@ class MotionParams(Params):
     )
     turn_scale_sd: float = Field(0.03, ge=0, lt=1, description="The same for turns.")
     fastest_m_s: float = Field(3.0, gt=0, description="Odometry that moves faster has jumped.")
-
-
-def wrapped(angle_rad: float) -> float:
-    """Angle in [-pi, pi)."""
-    angle = math.remainder(angle_rad, 2 * math.pi)
-    return -math.pi if angle >= math.pi else angle
-
-
-def composed(pose: FloatArray, moved: FloatArray) -> FloatArray:
-    """Pose (3,) after a movement (3,) in its own frame."""
-    cosine, sine = math.cos(pose[2]), math.sin(pose[2])
-    return np.array(
-        [
-            pose[0] + cosine * moved[0] - sine * moved[1],
-            pose[1] + sine * moved[0] + cosine * moved[1],
-            wrapped(pose[2] + moved[2]),
-        ]
-    )
 
 
 class Motion:
@@ -92,7 +74,7 @@ class Motion:
         stretch, turn = 1 + float(head[3]), 1 + float(head[4])
         cosine, sine = math.cos(head[2]), math.sin(head[2])
         x, y = cosine * forward - sine * leftward, sine * forward + cosine * leftward
-        pose = np.array([head[0] + stretch * x, head[1] + stretch * y, wrapped(head[2] + turn * turned)])
+        pose = np.array([head[0] + stretch * x, head[1] + stretch * y, wrap_one_angle(head[2] + turn * turned)])
         by_head = np.array(
             [[1.0, 0.0, -stretch * y, x, 0.0], [0.0, 1.0, stretch * x, y, 0.0], [0.0, 0.0, 1.0, 0.0, turned]]
         )

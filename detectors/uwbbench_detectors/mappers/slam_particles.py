@@ -23,13 +23,15 @@ from uwbbench.api import (
     Poses,
     Radar,
     Step,
+    compose,
     ports,
     wrap_angle,
+    wrap_one_angle,
 )
 from uwbbench_detectors.mappers import images
 from uwbbench_detectors.mappers.births import Trail, born
 from uwbbench_detectors.mappers.landmark_table import AA, AB, BB, HIGH, LOW, SUPPORT, WALL, A, B, LandmarkTable
-from uwbbench_detectors.mappers.motion import MotionParams, composed, wrapped
+from uwbbench_detectors.mappers.motion import MotionParams
 from uwbbench_detectors.mappers.particles import Particles
 
 COLLAPSED = 0.1
@@ -155,7 +157,7 @@ class SlamParticles(Mapper[SlamParticlesParams]):
         mean, covariance = self._particles.estimate(weight)
         if effective < len(weight) / 2:
             self._resample(weight)
-        return Poses.of_one(step.index, composed(self._start, mean), self._turned(covariance))
+        return Poses.of_one(step.index, compose(self._start, mean), self._turned(covariance))
 
     def finish(self) -> tuple[Poses | None, Map]:
         """No smoothed poses; walls with the pieces that were seen, and points."""
@@ -346,7 +348,7 @@ class SlamParticles(Mapper[SlamParticlesParams]):
         turn = np.array([[1.0, cosine * self._start[1] - sine * self._start[0]], [0.0, 1.0]])
         if rho < 0:
             rho, alpha, turn = -rho, alpha + math.pi, np.diag([-1.0, 1.0]) @ turn
-        return np.array([rho, wrapped(alpha)]), turn
+        return np.array([rho, wrap_one_angle(alpha)]), turn
 
     def _point(self, value: FloatArray) -> tuple[FloatArray, FloatArray]:
         """A point (2,) in the frame of the run, and the derivative of this (2, 2)."""

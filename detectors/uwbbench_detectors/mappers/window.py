@@ -9,8 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from pydantic import Field
 
-from uwbbench.api import Detections, FloatArray, Params, Radar
-from uwbbench_detectors.mappers.motion import composed
+from uwbbench.api import Detections, FloatArray, Params, Radar, compose
 
 
 class WindowParams(Params):
@@ -84,7 +83,7 @@ class Window:
         found : mapping of str to Detections
             By receiver. Rows whose range or azimuth is not finite are left out.
         """
-        self._pose = composed(self._pose, moved)
+        self._pose = compose(self._pose, moved)
         way, turn = math.hypot(moved[0], moved[1]), abs(float(moved[2]))
         self._travel_m += way
         self._turn_rad += turn
@@ -123,6 +122,6 @@ class Window:
         range_m, azimuth_rad = rows.range_m, rows.azimuth_rad
         counts = (range_m >= p.nearest_m) & (range_m <= p.farthest_m)
         counts &= np.abs(azimuth_rad) <= math.radians(p.azimuth_deg)
-        pose = composed(self._pose, self._mounts[receiver])
+        pose = compose(self._pose, self._mounts[receiver])
         heading = pose[2] + azimuth_rad[counts]
         return np.asarray(pose[:2] + range_m[counts, None] * np.column_stack([np.cos(heading), np.sin(heading)]))

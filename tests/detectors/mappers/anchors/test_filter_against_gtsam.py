@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from uwbbench.api import FloatArray
+from uwbbench.api import FloatArray, compose
 from uwbbench_detectors.mappers.ekf import Ekf
-from uwbbench_detectors.mappers.motion import Motion, MotionParams, composed
+from uwbbench_detectors.mappers.motion import Motion, MotionParams
 from uwbbench_detectors.mappers.point import PointModel
 from uwbbench_detectors.mappers.smoothing import Problem, Sightings, smooth
 
@@ -51,7 +51,7 @@ def driven(moved: FloatArray) -> FloatArray:
     """Poses (nodes, 3) after the movements."""
     poses = [np.zeros(3)]
     for step in moved:
-        poses.append(composed(poses[-1], step))
+        poses.append(compose(poses[-1], step))
     return np.array(poses)
 
 

@@ -5,9 +5,9 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from uwbbench.api import ConfigError, FloatArray
+from uwbbench.api import ConfigError, FloatArray, compose
 from uwbbench_detectors.mappers.logbook import Logbook
-from uwbbench_detectors.mappers.motion import MotionParams, composed
+from uwbbench_detectors.mappers.motion import MotionParams
 from uwbbench_detectors.mappers.point import PointModel
 from uwbbench_detectors.mappers.smoothing import Solution, close_loops, load_gtsam, smooth
 
@@ -33,7 +33,7 @@ def circle() -> FloatArray:
 def poses_after(moved: FloatArray) -> FloatArray:
     poses = [np.zeros(3)]
     for step in moved[1:]:
-        poses.append(composed(poses[-1], step))
+        poses.append(compose(poses[-1], step))
     return np.array(poses)
 
 
@@ -150,7 +150,7 @@ def test_without_landmarks_the_smoothed_run_is_odometry() -> None:
     smoothed = book.trajectory(solution)
     pose = np.array([1.0, 2.0, 3.0])
     for index, step in enumerate(circle()):
-        pose = composed(pose, step)
+        pose = compose(pose, step)
         np.testing.assert_allclose(smoothed.pose[index], pose, atol=1e-6)
 
 

@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 
 from tests.detectors.conftest import build_radar
-from uwbbench.api import Detections, Map, Mapper, Poses, Radar, Step, relative
+from uwbbench.api import Detections, Map, Mapper, Poses, Radar, Step, compose, relative
 from uwbbench.api.registry import load_plugin
-from uwbbench_detectors.mappers.motion import composed
 
 RODS = np.array([(0.0, 0.6), (0.9, -0.3), (-0.9, -0.4), (2.6, 0.2), (0.7, 2.3), (-2.6, 0.4), (-0.6, -2.3)])
 RATE_HZ = 12.0
@@ -44,7 +43,7 @@ class Course:
             yield Step(index, index / RATE_HZ, moved, found)
 
     def _seen(self, index: int, pose: np.ndarray, radar: Radar, rng: np.random.Generator) -> Detections:
-        x, y, yaw = composed(pose, np.array([*radar.mount_position_m[:2], radar.mount_yaw_rad]))
+        x, y, yaw = compose(pose, np.array([*radar.mount_position_m[:2], radar.mount_yaw_rad]))
         east, north = (self.rods - (x, y)).T
         range_m = np.hypot(east, north)
         azimuth = (np.arctan2(north, east) - yaw + np.pi) % (2 * np.pi) - np.pi

@@ -6,9 +6,9 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
-from uwbbench.api import LandmarkKind
+from uwbbench.api import LandmarkKind, compose
 from uwbbench_detectors.mappers.ekf import Ekf
-from uwbbench_detectors.mappers.motion import MotionParams, composed
+from uwbbench_detectors.mappers.motion import MotionParams
 from uwbbench_detectors.mappers.point import PointModel
 
 POINT = PointModel()
@@ -98,7 +98,7 @@ class Wandering:
                 [0.1 * 0.005**2, 0.1 * 0.005**2, 0.1 * np.radians(1) ** 2 + np.radians(0.5) ** 2 * abs(moved[2])]
             )
             ekf.predict(moved)
-            pose = composed(pose, moved * (stretch, stretch, turned) + spread * rng.standard_normal(3))
+            pose = compose(pose, moved * (stretch, stretch, turned) + spread * rng.standard_normal(3))
             range_m = np.hypot(*(marks - pose[:2]).T)
             if step % 4 == 0:
                 for number in np.flatnonzero(range_m < 3.5)[:3]:

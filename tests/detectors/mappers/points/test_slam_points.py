@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from uwbbench.api import Detections, Poses, Step
-from uwbbench_detectors.mappers.motion import composed
+from uwbbench.api import Detections, Poses, Step, compose
 from uwbbench_detectors.mappers.slam_points import SlamPoints, SlamPointsParams
 
 
@@ -41,7 +40,7 @@ def test_odometry_alone_is_dead_reckoning(loop, driven):
     course = loop(rounds=1)
     pose = course.truth[0]
     for moved, found in zip(course.moved, driven("odometry", course).pose, strict=True):
-        pose = composed(pose, moved)
+        pose = compose(pose, moved)
         np.testing.assert_allclose(found, pose, atol=1e-9)
 
 
@@ -129,4 +128,4 @@ def test_a_step_without_receivers_is_dead_reckoning(loop):
     mapper = SlamPoints(SlamPointsParams.model_validate({}))
     mapper.open(course.radars, Poses.of_one(0, course.truth[0]))
     found = mapper.step(Step(0, 0.0, np.array([0.1, 0.0, 0.2]), {}))
-    np.testing.assert_allclose(found.pose[0], composed(course.truth[0], np.array([0.1, 0.0, 0.2])))
+    np.testing.assert_allclose(found.pose[0], compose(course.truth[0], np.array([0.1, 0.0, 0.2])))
