@@ -76,6 +76,18 @@ def simulated_approach(**params: object) -> Capture:
     return dataset.open(dataset.names()[0])
 
 
+@pytest.fixture(scope="module", autouse=True)
+def names_of_this_file() -> Iterator[None]:
+    """Take back the names of plugins that tests of a file have given: the next would find them among the shipped."""
+    before = dict(registry._registered)
+    yield
+    if registry._registered != before:
+        registry._registered.clear()
+        registry._registered.update(before)
+        registry.entries.cache_clear()
+        registry.load_plugin.cache_clear()
+
+
 @pytest.fixture(scope="session")
 def approach() -> Capture:
     """A metal plate approached on channel 9, with STS."""
