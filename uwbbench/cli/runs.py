@@ -51,6 +51,14 @@ def run(
         Path | None,
         typer.Option(metavar="FILE", help="Draw its captures from these secret seeds: its private half."),
     ] = None,
+    isolation: Annotated[
+        bool,
+        typer.Option(
+            "--isolation/--no-isolation",
+            help="Each detector in processes of its own, with limits. Without, for a debugger: a detector can then "
+            "change what others find, and end or hang the run.",
+        ),
+    ] = True,
     settings: options.Settings = None,
     json: options.Json = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress on the terminal.")] = False,
@@ -74,7 +82,9 @@ def run(
     _say_left_out(plan)
     try:
         with _progress_bar(quiet) as advance:
-            folder = run_experiment(plan, resume or out, jobs=jobs, resume=resume is not None, progress=advance)
+            folder = run_experiment(
+                plan, resume or out, jobs=jobs, resume=resume is not None, isolated=isolation, progress=advance
+            )
     except Interrupted as stop:
         typer.echo(str(stop), err=True)
         raise typer.Exit(INTERRUPTED) from stop
