@@ -20,7 +20,7 @@ class FixedTrackParams(MotionParams):
     by_chance: float = Field(0.1, gt=0, lt=1, description="Probability that a look finds something else in its place.")
     most_evidence: float = Field(5.0, gt=0, description="Log odds that an object can gather: it is lost in so many.")
     shown: float = Field(0.0, description="Log odds from which on an object is a row.")
-    birth: float = Field(-1.5, description="Log odds of what was detected once.")
+    birth: float = Field(-0.8, description="Log odds of what was detected once.")
     range_sd_m: float = Field(0.06, gt=0, description="Error of a range, of the parts of an extended object.")
     azimuth_sd_deg: float = Field(6.0, gt=0, description="Error of an azimuth.")
     wander_m: float = Field(0.1, ge=0, description="By which the part that reflects moves, over a metre of way.")

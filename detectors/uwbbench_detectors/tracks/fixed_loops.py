@@ -168,7 +168,7 @@ def hidden(objects: FloatArray, count: int, place: int, at: FloatArray) -> bool:
     return False
 
 
-@inlined
+@compiled
 def followed(
     objects: FloatArray,
     carried: FloatArray,
