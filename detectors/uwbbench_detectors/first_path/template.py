@@ -113,10 +113,14 @@ class AlignTemplate(Stage[AlignTemplateParams]):
             parts[name] = plain(made, np.complex64)
             refused |= not clear[frames.valid].all()
         if refused:
-            self.note(
-                "align.template: responses whose direct path stands less than "
-                f"{self.params.minimum_snr_db:g} dB above the noise were refused and yield nothing"
-            )
+            self.note_refused()
         zero = np.full(len(frames), float(self.params.to_tap))
         aligned = dataclasses.replace(frames, **parts)
         return block.replace(frames=aligned, first_path=zero)
+
+    def note_refused(self) -> None:
+        """Say that responses were refused."""
+        self.note(
+            "align.template: responses whose direct path stands less than "
+            f"{self.params.minimum_snr_db:g} dB above the noise were refused and yield nothing"
+        )

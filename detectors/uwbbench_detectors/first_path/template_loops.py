@@ -133,7 +133,7 @@ def stands_out(padded: Any, crest: int, at: FloatArray) -> bool:
     return height * (stop - start) >= power * at[POWER_RATIO]
 
 
-@inlined
+@compiled
 def align_response(
     samples: Any, template: Any, carried: FloatArray, at: FloatArray, table: Any, padded: Any, made: Any
 ) -> bool:
