@@ -67,12 +67,16 @@ def squared_distances(
     """
     marks, numbers = off.shape
     squared = np.zeros(marks)
-    rows, left = np.arange(5), np.empty(numbers)
+    rows, left = np.empty(5, np.int64), np.empty(numbers)
     seen, spread = np.empty((numbers, 5)), np.empty((numbers, numbers))
     for mark in range(marks):
-        rows[3], rows[4] = starts[mark], starts[mark] + 1
-        seen[:, :3], seen[:, 3:] = by_pose[mark], by_mark[mark]
+        rows[0], rows[1], rows[2], rows[3], rows[4] = 0, 1, 2, starts[mark], starts[mark] + 1
         for one in range(numbers):
+            left[one] = off[mark, one]
+            for row in range(3):
+                seen[one, row] = by_pose[mark, one, row]
+            for row in range(2):
+                seen[one, 3 + row] = by_mark[mark, one, row]
             for other in range(one + 1):
                 value = noise[one, other]
                 for row in range(5):
@@ -80,7 +84,6 @@ def squared_distances(
                         value += seen[one, row] * covariance[rows[row], rows[column]] * seen[other, column]
                 spread[one, other] = value
         # S = L D L', column by column, and L y = v along with it: the distance is the sum of y^2 / D.
-        left[:] = off[mark]
         for one in range(numbers):
             squared[mark] += left[one] * left[one] / spread[one, one]
             for later in range(numbers - 1, one, -1):
@@ -95,7 +98,11 @@ def squared_distances(
 def _inverse(spread: FloatArray) -> FloatArray:
     """Inverse of a symmetric positive definite matrix, by Gauss and Jordan without pivots, which it does not need."""
     size = len(spread)
-    left, inverse = spread.copy(), np.eye(size)
+    left, inverse = np.empty((size, size)), np.zeros((size, size))
+    for one in range(size):
+        inverse[one, one] = 1.0
+        for other in range(size):
+            left[one, other] = spread[one, other]
     for one in range(size):
         pivot = left[one, one]
         for column in range(size):
@@ -153,9 +160,10 @@ def correct(
         for row in range(len(rows)):
             for column in range(size):
                 across[one, column] += seen[one, row] * covariance[rows[row], column]
-    spread = noise.copy()
+    spread = np.empty((numbers, numbers))
     for one in range(numbers):
         for other in range(one + 1):
+            spread[one, other] = noise[one, other]
             for row in range(len(rows)):
                 spread[one, other] += across[one, rows[row]] * seen[other, row]
             spread[other, one] = spread[one, other]
@@ -190,6 +198,8 @@ def sighted(pose: FloatArray, marks: FloatArray) -> tuple[FloatArray, FloatArray
         measured[mark, 0], measured[mark, 1] = range_m, math.atan2(north, east) - pose[2]
         by_mark[mark, 0, 0], by_mark[mark, 0, 1] = east / range_m, north / range_m
         by_mark[mark, 1, 0], by_mark[mark, 1, 1] = -north / squared, east / squared
-        by_pose[mark, :, :2] = -by_mark[mark]
+        for number in range(2):
+            for axis in range(2):
+                by_pose[mark, number, axis] = -by_mark[mark, number, axis]
         by_pose[mark, 1, 2] = -1.0
     return measured, by_pose, by_mark
