@@ -11,6 +11,10 @@ from pydantic import Field
 from uwbbench.api import SPEED_OF_LIGHT_M_S, Block, Detections, Params, Radar, Stage, ports
 
 
+FRESH_RATE = 0.01
+"""Share of frames of noise alone in which some path is fresh, at most."""
+
+
 class TrackBeforeDetectParams(Params):
     """How bodies move, how deep they are, and how often noise may look like one."""
 
@@ -51,6 +55,18 @@ class TrackBeforeDetectParams(Params):
         le=60,
         description="Most evidence of one tap in one frame. A path must have gathered more than this, so that no "
         "single frame, however disturbed, is a detection.",
+    )
+    fresh_s: float = Field(
+        0.25,
+        gt=0,
+        description="Time in which fresh evidence is forgotten. While a body fades its path lives on, and noise near it "
+        "must not be taken for it: a detection needs evidence of this time that noise alone has in a frame of 100.",
+    )
+    start_s: float = Field(
+        2.0,
+        ge=0,
+        description="What a tap shows on average in this time from the first frame on is where its level starts: a radar "
+        "that warms up, a background that is not yet learnt.",
     )
     level_s: float = Field(
         60.0,
@@ -125,11 +141,14 @@ class TrackBeforeDetect(Stage[TrackBeforeDetectParams]):
         settings = {
             loops.TAPS_A_SECOND: p.speed_m_s / tap_m,
             loops.MEMORY_S: math.sqrt(2 * p.depth_m / p.acceleration_m_s2),
+            loops.FRESH_S: p.fresh_s,
+            loops.START_S: p.start_s,
             loops.LEVEL_S: p.level_s,
             loops.NEUTRAL_DB: neutral,
             loops.LOWEST_DB: p.lowest_db,
             loops.HIGHEST_DB: p.highest_db,
             loops.THRESHOLD_DB: p.highest_db + threshold_db(cells, radar.taps, p.false_alarm_rate, neutral, clips),
+            loops.FRESH_DB: threshold_db(cells, radar.taps, FRESH_RATE, neutral, clips),
             loops.DEPTH_TAPS: math.ceil(min(p.depth_m / tap_m, radar.taps)),
             loops.GUARD_TAPS: p.guard_taps,
         }
@@ -137,6 +156,7 @@ class TrackBeforeDetect(Stage[TrackBeforeDetectParams]):
         self._settings = np.zeros(loops.SETTINGS)
         self._settings[list(settings)] = list(settings.values())
         self._gathered = np.zeros((p.targets, radar.taps))
+        self._fresh = np.zeros((p.targets, radar.taps))
         self._level = np.zeros(radar.taps)
         self._carried = np.zeros(loops.CARRIED)
         self._carried[loops.TIME_S] = np.nan
@@ -153,6 +173,7 @@ class TrackBeforeDetect(Stage[TrackBeforeDetectParams]):
             frames.timestamp_s,
             usable,
             self._gathered,
+            self._fresh,
             self._level,
             self._carried,
             self._settings,

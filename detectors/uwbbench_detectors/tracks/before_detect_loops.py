@@ -8,15 +8,29 @@ import numpy as np
 
 from uwbbench.api import BoolArray, FloatArray, IntArray, compiled, inlined
 
-TAPS_A_SECOND, MEMORY_S, LEVEL_S, NEUTRAL_DB, LOWEST_DB, HIGHEST_DB, THRESHOLD_DB, DEPTH_TAPS, GUARD_TAPS = range(9)
-"""Places of the settings: largest speed in taps; times in which paths and the level of each tap forget; power over noise
-that is no evidence; clips of the evidence; what a path must have gathered; taps about a target in which there is no
-other; taps behind the first path that are not looked at."""
-SETTINGS = 9
-TIME_S, REACH_TAPS = range(2)
-"""Places of what is carried besides: time of the last usable frame, and the taps that a body may have gone since the
-last whole one."""
-CARRIED = 2
+(
+    TAPS_A_SECOND,
+    MEMORY_S,
+    FRESH_S,
+    START_S,
+    LEVEL_S,
+    NEUTRAL_DB,
+    LOWEST_DB,
+    HIGHEST_DB,
+    THRESHOLD_DB,
+    FRESH_DB,
+    DEPTH_TAPS,
+    GUARD_TAPS,
+) = range(12)
+"""Places of the settings: largest speed in taps; times in which a path forgets, as a whole and to be fresh; time at the
+start of which the level of each tap is the mean, and time in which it forgets; power over noise that is no evidence; clips
+of the evidence; what a path must have gathered, as a whole and freshly; taps about a target in which there is no other;
+taps behind the first path that are not looked at."""
+SETTINGS = 12
+TIME_S, ELAPSED_S, REACH_TAPS = range(3)
+"""Places of what is carried besides: time of the last usable frame; time since the first; and the taps that a body may
+have gone since the last whole one."""
+CARRIED = 3
 
 
 @inlined
@@ -72,6 +86,7 @@ def follow(
     timestamp_s: FloatArray,
     usable: BoolArray,
     gathered: FloatArray,
+    fresh: FloatArray,
     level: FloatArray,
     carried: FloatArray,
     at: FloatArray,
@@ -83,8 +98,8 @@ def follow(
     amplitude : (frames, taps) array
     noise, first_path, timestamp_s : (frames,) arrays
     usable : (frames,) bool array
-    gathered : (targets, taps) array
-        Evidence of the best path to each tap; carried on.
+    gathered, fresh : (targets, taps) arrays
+        Evidence of the best path to each tap, and of the one that forgets sooner; carried on.
     level : (taps,) array
         What each tap has shown for long; carried on.
     carried : (CARRIED,) array
@@ -108,25 +123,30 @@ def follow(
             continue
         passed_s = 0.0 if math.isnan(carried[TIME_S]) else timestamp_s[frame] - carried[TIME_S]
         carried[TIME_S] = timestamp_s[frame]
+        carried[ELAPSED_S] += passed_s
+        learns = -math.expm1(-passed_s / at[LEVEL_S])
+        if carried[ELAPSED_S] <= at[START_S]:
+            learns = passed_s / carried[ELAPSED_S] if carried[ELAPSED_S] > 0 else 1.0
         carried[REACH_TAPS] += at[TAPS_A_SECOND] * passed_s
         reach = int(min(carried[REACH_TAPS], taps - 1.0))
         carried[REACH_TAPS] -= min(math.floor(carried[REACH_TAPS]), carried[REACH_TAPS])
-        keeps = math.exp(-passed_s / at[MEMORY_S])
+        keeps, stays_fresh = math.exp(-passed_s / at[MEMORY_S]), math.exp(-passed_s / at[FRESH_S])
         start = min(max(int(math.floor(first_path[frame] + at[GUARD_TAPS])) + 1, 0), taps)
-        evidence = weigh(amplitude[frame], noise[frame], start, level, -math.expm1(-passed_s / at[LEVEL_S]), at)
+        evidence = weigh(amplitude[frame], noise[frame], start, level, learns, at)
         for target in range(targets):
-            best = reached(gathered[target], reach)
+            best, newest = reached(gathered[target], reach), reached(fresh[target], reach)
             crest = -1
             highest = at[THRESHOLD_DB]
             for tap in range(taps):
                 value = max(keeps * best[tap] + evidence[tap], 0.0)
                 gathered[target, tap] = value
+                fresh[target, tap] = max(stays_fresh * newest[tap] + evidence[tap], 0.0)
                 if value > highest:
                     highest = value
                     crest = tap
             if crest < 0:
                 continue
-            if evidence[crest] > 0:
+            if fresh[target, crest] > at[FRESH_DB] and evidence[crest] > 0:
                 row[count] = frame
                 found_tap[count] = crest
                 score[count] = highest
