@@ -158,3 +158,38 @@ class ProbabilityFilter(LimitFilter[ProbabilityFilterParams]):
 
     consumes: ClassVar[frozenset[str]] = ports("detections", "probability")
     limits: ClassVar[Mapping[str, Limit]] = {"minimum": Limit("probability", "least")}
+
+
+class AzimuthFilterParams(Params):
+    """Sector."""
+
+    maximum_deg: float = Field(47.0, gt=0, description="Largest azimuth from boresight, to either side.")
+
+
+class AzimuthFilter(Filter[AzimuthFilterParams]):
+    """Keep what lies in a sector around the boresight."""
+
+    consumes: ClassVar[frozenset[str]] = ports("detections", "azimuth_rad")
+
+    def keep(self, block: Block) -> BoolArray:
+        """Mask of the detections in the sector."""
+        return np.asarray(np.abs(block.detections.azimuth_rad) <= np.deg2rad(self.params.maximum_deg))
+
+
+class AngleCostFilterParams(Params):
+    """Largest disagreement."""
+
+    maximum: float = Field(
+        1.5,
+        ge=0,
+        description="Sum of the squared deviations of Doppler and phase difference from those of one direction, in "
+        "standard deviations: of two measurements of one unknown, below 1.5 in 78 % of honest echoes by chance, in more "
+        "where the assumed errors are wide.",
+    )
+
+
+class AngleCostFilter(LimitFilter[AngleCostFilterParams]):
+    """Keep what arrives from the direction that its Doppler speaks of, as echoes by way of one reflection do."""
+
+    consumes: ClassVar[frozenset[str]] = ports("detections", "angle_cost")
+    limits: ClassVar[Mapping[str, Limit]] = {"maximum": Limit("angle_cost", "most")}
