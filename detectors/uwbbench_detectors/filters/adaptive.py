@@ -86,8 +86,8 @@ class AdaptiveFilter(Filter[AdaptiveFilterParams]):
       amplitude is at least ``x + q (y - x)``, with q of :func:`uwbbench_detectors.filters.false_alarms.spread_factor`.
       The rate holds at each delay, however the floor decays, where it is diffuse; ringing that is the same in all
       frames passes less often. As an echo reaches its crest at a delay when the robot has moved for half its length,
-      the frames of the last ``1.5 c / (2 B)`` of way are left out, B the bandwidth: what arrives does not hide itself. What
-      keeps its delay over the way that the history is long, such as a wall that the robot drives along, does.
+      the frames of the last ``1.5 c / (2 B)`` of way are left out, B the bandwidth: what arrives does not hide itself.
+      What keeps its delay over the way that the history is long, such as a wall that the robot drives along, does.
     * Against the law of distance: ``A >= A_direct 10^(least_echo_db / 20) (1 m / R)^(1 or 2)``, with R half the way of
       the delay.
 
