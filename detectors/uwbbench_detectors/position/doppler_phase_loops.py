@@ -24,7 +24,7 @@ def directions() -> FloatArray:
     return np.ascontiguousarray(np.stack([np.cos(angle), np.sin(angle)]))
 
 
-@inlined
+@compiled
 def joint_angle(
     row: FloatArray, along: tuple[float, float], fan: FloatArray, at: FloatArray, cost: FloatArray
 ) -> tuple[float, float, float]:
