@@ -15,7 +15,7 @@ from typing import Any, Protocol, Self
 
 from uwbbench.api.interruption import by_plugin
 from uwbbench.run.crew.messages import GAVE, LARGEST_BYTES, LENGTH, Refused, packed, send, unpacked
-from uwbbench.run.crew.nursery import LIVED, Nursery, nursery
+from uwbbench.run.crew.nursery import LIVED, LOST, Nursery, nursery
 from uwbbench.run.crew.worker import Raised, Surroundings, said_of
 
 MOST_IDLE = 12
@@ -283,7 +283,7 @@ def _raised(message: bytes) -> Raised:
 
 def _how(code: int) -> str:
     """What an exit code means."""
-    if code == LIVED:
+    if code in (LIVED, LOST):
         return "its process closed the line to the run"
     if code >= 0:
         return f"its process ended itself (exit code {code})"

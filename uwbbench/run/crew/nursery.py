@@ -19,6 +19,8 @@ from uwbbench.api.errors import UwbbenchError
 FORK, WAIT, KILL = b"F", b"W", b"K"
 LIVED = 256
 """In place of the exit code of a worker that closed its line and lived on, until it was killed for that."""
+LOST = 74
+"""Exit code of a worker whose line was closed; that of an input or output error in sysexits.h."""
 NUMBER = struct.Struct("<q")
 
 

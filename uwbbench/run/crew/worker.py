@@ -8,12 +8,16 @@ import socket
 import sys
 import traceback
 from collections.abc import Mapping
-from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NoReturn
 
+import cloudpickle
+
+from uwbbench.api import registry
+from uwbbench.api.errors import PluginError
 from uwbbench.run.crew.messages import GAVE, RAISED, packed, receive, send
+from uwbbench.run.crew.nursery import LOST
 
 
 @dataclass(frozen=True)
@@ -29,17 +33,40 @@ class Surroundings:
         The current one.
     memory_mb : float or None
         What it may allocate.
+    registered : bytes
+        Classes that a script or notebook has registered, which may be of no module that others can import.
     """
 
     path: tuple[str, ...]
     environment: Mapping[str, str]
     folder: str
     memory_mb: float | None
+    registered: bytes
 
     @classmethod
     def here(cls, memory_mb: float | None) -> Surroundings:
-        """Those of this process."""
-        return cls(tuple(sys.path), dict(os.environ), str(Path.cwd()), memory_mb)
+        """Those of this process.
+
+        Parameters
+        ----------
+        memory_mb : float or None
+            What a worker may allocate.
+
+        Raises
+        ------
+        PluginError
+            If a registered class cannot be given to another process.
+        """
+        classes = registry.registered()
+        try:
+            given = cloudpickle.dumps(classes)
+        except Exception as error:
+            names = ", ".join(f"'{name}'" for _, name in classes)
+            raise PluginError(
+                f"{names}, registered here alone, cannot be given to the workers of a run ({error}); make a package of "
+                "it with 'uwbbench new', or run without isolation"
+            ) from error
+        return cls(tuple(sys.path), dict(os.environ), str(Path.cwd()), memory_mb, given)
 
     def take_over(self) -> None:
         """Make them those of this process."""
@@ -47,6 +74,7 @@ class Surroundings:
         os.environ.clear()
         os.environ.update(self.environment)
         os.chdir(self.folder)
+        registry.take_over(cloudpickle.loads(self.registered))
         if self.memory_mb is not None:
             import resource
 
@@ -82,11 +110,14 @@ def said_of(error: BaseException) -> Raised:
 
 def work(descriptor: int) -> NoReturn:
     """Carry out the calls that come over a socket; never returns into the process that it was forked from."""
+    code = LOST
     try:
         os.dup2(2, 1)  # what a plugin prints is no result of the run
-        _carry_out(socket.socket(fileno=descriptor))
+        with socket.socket(fileno=descriptor) as channel:
+            _carry_out(channel)
+        code = 0
     finally:
-        os._exit(0)
+        os._exit(code)
 
 
 def _carry_out(channel: socket.socket) -> None:
@@ -104,5 +135,4 @@ def _carry_out(channel: socket.socket) -> None:
             answer = GAVE + packed(function(*arguments))
         except BaseException as error:  # noqa: BLE001 - a plugin may raise anything
             answer = RAISED + packed(said_of(error))
-        with suppress(BrokenPipeError):
-            send(channel, answer)
+        send(channel, answer)
