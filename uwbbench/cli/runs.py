@@ -229,12 +229,14 @@ def _conclude(folder: RunFolder, data_dir: Path | None, *, json: bool) -> None:
 
     with read_safely(folder.path):
         run_report = Report(folder)
+        if json:
+            render.print_json(formats.as_json(run_report))
+        else:
+            render.print_leaderboard(run_report)
         path, missing = written.write_into_run(run_report, data_roots(data_dir))
         render.print_notes([missing] if missing else [])
         if json:
-            render.print_json(formats.as_json(run_report))
             return
-        render.print_leaderboard(run_report)
     typer.echo(f"run folder: {folder.path} (all tables: {path}, or 'uwbbench report {folder.path}')")
 
 
