@@ -10,9 +10,9 @@ import numpy as np
 from uwbbench.api import BoolArray, FloatArray, compiled, inlined
 from uwbbench_detectors.first_path.fractional import PAD, moved, power_between
 
-TO_TAP, CREST_START, CREST_STOP, LEAD, MEMORY, STEP_M, POWER_RATIO, LEADING = range(8)
+TO_TAP, CREST_START, CREST_STOP, LEAD, MEMORY, STEP_M, POWER_RATIO, LEADING, TRAIL = range(9)
 """Settings, by their places."""
-SETTINGS = 8
+SETTINGS = 9
 COUNT, PATH_M, X_M, Y_M = range(4)
 """State of a response between frames, by its places: looks that made the template, the path since the last one, and the
 robot's place."""
@@ -174,7 +174,7 @@ def align_response(
     settled = carried[COUNT] >= FIRST_LOOKS
     tap = refined(padded, float(crest), 1 if settled else 3, table)
     tap = max(min(tap, to_tap + REACH), to_tap - REACH)
-    start, stop = max(aim - int(at[LEAD]), 1), min(aim + 3, taps - 1)
+    start, stop = max(aim - int(at[LEAD]), 1), min(aim + int(at[TRAIL]) + 1, taps - 1)
     if settled:
         for _ in range(2):
             moved(padded, tap - to_tap, table, start, stop, made)
