@@ -145,7 +145,7 @@ def ways_of(room: Room, seen: FloatArray, a: Antennas, wall: float, clutter: Flo
             every.append(Ways(length, share * wall * a.wavelength_m / (4 * np.pi * length) + 0j, behind[:, None]))
         corner = image(image(a.out_m, side, room.half_m), (side + 1) % 4, room.half_m)
         length = np.linalg.norm(corner - a.back_m, axis=1)[:, None]
-        every.append(Ways(length, 2 * wall**2 * a.wavelength_m / (4 * np.pi * length) + 0j, corner[:, None]))
+        every.append(Ways(length, wall**2 * a.wavelength_m / (4 * np.pi * length) + 0j, corner[:, None]))
         out, back = image(a.out_m, side, room.half_m), image(a.back_m, side, room.half_m)
         mirrored = image(half_as_many.center_m, side, room.half_m)[None]
         for start, end, strength, last in (
