@@ -26,6 +26,7 @@ from uwbbench.api.capture import Capture, Samples
 from uwbbench.api.errors import CaptureError, nearest
 from uwbbench.api.mapped import MappedSamples
 from uwbbench.api.radar import Radar
+from uwbbench.api.text import LONGEST_VALUE, printable, quoted
 from uwbbench.api.truth import Obstacle, Trajectory, Truth
 
 FORMAT = "uwbbench-capture"
@@ -91,24 +92,24 @@ class _Reader:
             if kind is tuple:
                 vector = tuple(float(item) for item in np.asarray(value, float).ravel())
                 if len(vector) != 3 or not np.all(np.isfinite(vector)):
-                    raise self.fail(label, f"expected 3 finite numbers, found {value!r}")
+                    raise self.fail(label, f"expected 3 finite numbers, found {quoted(value)}")
                 return vector
             if isinstance(value, str | bytes):
-                raise self.fail(label, f"expected {kind.__name__}, found the text {value!r}")
+                raise self.fail(label, f"expected {kind.__name__}, found the text {quoted(value)}")
             number = kind(value)
             if kind is float and not np.isfinite(number):
-                raise self.fail(label, f"expected a finite number, found {value!r}")
+                raise self.fail(label, f"expected a finite number, found {quoted(value)}")
             if kind is not float and number != value:
-                raise self.fail(label, f"expected {kind.__name__}, found {value!r}")
+                raise self.fail(label, f"expected {kind.__name__}, found {quoted(value)}")
             return number
         except (TypeError, ValueError, OverflowError) as error:
-            raise self.fail(label, f"expected {kind.__name__}, found {value!r}") from error
+            raise self.fail(label, f"expected {kind.__name__}, found {quoted(value)}") from error
 
     def positive(self, where: str, name: str) -> float:
         """Attribute that must be a positive number."""
         value: float = self.attribute(where, name, float)
         if value <= 0:
-            raise self.fail(f"{where}@{name}", f"expected a positive number, found {value!r}")
+            raise self.fail(f"{where}@{name}", f"expected a positive number, found {quoted(value)}")
         return value
 
     def dataset(self, where: str, *, required: bool = True) -> h5py.Dataset | None:
@@ -238,10 +239,10 @@ def _opened(reader: _Reader, receiver: str, receivers: tuple[str, ...]) -> Captu
 def _receivers(reader: _Reader) -> tuple[str, ...]:
     kind = reader.attribute("/", "format", str)
     if kind != FORMAT:
-        raise reader.fail("/@format", f"expected '{FORMAT}', found '{kind}'")
+        raise reader.fail("/@format", f"expected '{FORMAT}', found {quoted(kind)}")
     version = reader.attribute("/", "format_version", str)
     if version.split(".")[0] != "1":
-        raise reader.fail("/@format_version", f"version {version} is not readable here; expected 1.x")
+        raise reader.fail("/@format_version", f"version {printable(version, LONGEST_VALUE)} is not readable here; expected 1.x")
     receivers = tuple(sorted(reader.group("/receivers")))
     if not receivers:
         raise reader.fail("/receivers", "expected at least one receiver")
@@ -287,7 +288,7 @@ def _read(reader: _Reader, receiver: str, receivers: tuple[str, ...], base: str,
     """
     storage = reader.attribute("/radar", "samples", str)
     if storage not in ("iq", "rf"):
-        raise reader.fail("/radar@samples", f"expected 'iq' or 'rf', found '{storage}'")
+        raise reader.fail("/radar@samples", f"expected 'iq' or 'rf', found {quoted(storage)}")
     preamble = reader.samples(f"{base}/preamble", "c" if storage == "iq" else "fiu", None, required=True)
     assert preamble is not None  # noqa: S101
     shape = (int(preamble.shape[0]), int(preamble.shape[1]))
@@ -325,7 +326,7 @@ def _read(reader: _Reader, receiver: str, receivers: tuple[str, ...], base: str,
     )
     source = reader.attribute("/", "source", str)
     if source not in ("measured", "simulated"):
-        raise reader.fail("/@source", f"expected 'measured' or 'simulated', found '{source}'")
+        raise reader.fail("/@source", f"expected 'measured' or 'simulated', found {quoted(source)}")
     name = reader.attribute("/", "name", str)
     texts = {key: reader.attribute("/", key, str, "") for key in TEXTS}
     if apart:
