@@ -97,7 +97,9 @@ def in_child(path: Path, work: Callable[[], T]) -> T:
     limit_s = LEAST_S + path.stat().st_size / BYTES_A_SECOND
     reading, writing = os.pipe()
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", DeprecationWarning)  # of forks beside threads: the child takes no lock of theirs
+        warnings.simplefilter(
+            "ignore", DeprecationWarning
+        )  # of forks beside threads: the child takes no lock of theirs
         child = os.fork()
     if child == 0:
         _child(path, work, writing, limit_s)

@@ -242,7 +242,9 @@ def _receivers(reader: _Reader) -> tuple[str, ...]:
         raise reader.fail("/@format", f"expected '{FORMAT}', found {quoted(kind)}")
     version = reader.attribute("/", "format_version", str)
     if version.split(".")[0] != "1":
-        raise reader.fail("/@format_version", f"version {printable(version, LONGEST_VALUE)} is not readable here; expected 1.x")
+        raise reader.fail(
+            "/@format_version", f"version {printable(version, LONGEST_VALUE)} is not readable here; expected 1.x"
+        )
     receivers = tuple(sorted(reader.group("/receivers")))
     if not receivers:
         raise reader.fail("/receivers", "expected at least one receiver")

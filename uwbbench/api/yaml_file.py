@@ -170,7 +170,9 @@ class _Builder:
             return _integer(node.value) if node.tag.endswith(":int") else self.loader.construct_object(node)
         except (ValueError, KeyError) as error:
             kind = node.tag.rpartition(":")[2]
-            raise ConfigError(f"{self.name}:{line}: '{printable(node.value, LONGEST_VALUE)}' is not a valid {kind}") from error
+            raise ConfigError(
+                f"{self.name}:{line}: '{printable(node.value, LONGEST_VALUE)}' is not a valid {kind}"
+            ) from error
 
     def _mapping(self, node: Any, path: Path_) -> dict[Any, Any]:
         values: dict[Any, Any] = {}
