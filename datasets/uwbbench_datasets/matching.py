@@ -16,8 +16,9 @@ _MAGIC = re.compile(r"[*?[]")
 
 
 def matching_files(folder: Path, pattern: str) -> list[str]:
-    """Files that a pattern matches, as :func:`glob.glob` finds them: ``**`` is any number of folders, and what is
-    hidden is passed over.
+    """Files that a pattern matches.
+
+    As :func:`glob.glob` finds them: ``**`` is any number of folders, and what is hidden is passed over.
 
     Parameters
     ----------
@@ -53,7 +54,7 @@ class _Search:
         elif parts[0] == "**":
             yield from self.below(place, parts[1:] or ("*",))
             for entry in self._entries(place):
-                if not entry.name.startswith(".") and entry.is_dir():
+                if not entry.name.startswith(".") and _is_folder(entry):
                     yield from self.below(os.path.join(place, entry.name), parts)  # noqa: PTH118
         elif _MAGIC.search(parts[0]):
             for entry in self._entries(place):
@@ -76,3 +77,10 @@ class _Search:
                     yield entry
         except OSError:  # no folder, or none that may be looked into
             return
+
+
+def _is_folder(entry: os.DirEntry[str]) -> bool:
+    try:
+        return entry.is_dir()
+    except OSError:  # a link that leads back to itself
+        return False

@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import faulthandler
 import gc
+import math
 import os
 import pickle
 import select
@@ -33,7 +34,9 @@ from uwbbench.api.errors import CaptureError
 T = TypeVar("T")
 VARIABLE = "UWBBENCH_TRUST_FILES"
 LEAST_S, BYTES_A_SECOND = 10.0, 20e6
-"""A child may take so long over a small file; a larger one gives it the time to be read so slowly."""
+"""A child may compute for so long over a small file; a larger one gives it the time to be read so slowly."""
+WAITING = 2.5
+"""It may take so many times as long by the clock, as it need not be alone on the machine."""
 MOST_BYTES = 4 << 30
 """Memory that a child may ask for on top of what it starts with."""
 _examined: dict[tuple[Any, ...], str] = {}
@@ -75,7 +78,7 @@ def trust(path: Path) -> None:
     _examined[_mark(path)] = ""
 
 
-def in_child(path: Path, work: Callable[[], T]) -> T:
+def in_child(path: Path, work: Callable[[], T], least_s: float | None = None) -> T:
     """Result of some work on a file, done in a child.
 
     Parameters
@@ -84,6 +87,8 @@ def in_child(path: Path, work: Callable[[], T]) -> T:
         For messages, and for the time that the child is given.
     work : callable
         What it returns, and the errors that it raises, are pickled.
+    least_s : float, optional
+        Time that it may compute for, over a small file; :data:`LEAST_S` if left out.
 
     Raises
     ------
@@ -94,25 +99,23 @@ def in_child(path: Path, work: Callable[[], T]) -> T:
     """
     if sys.platform != "linux" or _inside or os.environ.get(VARIABLE) == "1":
         return work()
-    limit_s = LEAST_S + path.stat().st_size / BYTES_A_SECOND
+    limit_s = (LEAST_S if least_s is None else least_s) + path.stat().st_size / BYTES_A_SECOND
     reading, writing = os.pipe()
     with warnings.catch_warnings():
-        warnings.simplefilter(
-            "ignore", DeprecationWarning
-        )  # of forks beside threads: the child takes no lock of theirs
+        warnings.simplefilter("ignore", DeprecationWarning)  # forks beside threads: the child needs no lock of theirs
         child = os.fork()
     if child == 0:
         _child(path, work, writing, limit_s)
     os.close(writing)
     answer = None
     try:
-        answer = _heard(reading, limit_s)
+        answer = _heard(reading, WAITING * limit_s)
     finally:
         os.close(reading)
         if answer is None:  # its time is over, or the user has interrupted
             os.kill(child, signal.SIGKILL)
         ended = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
-    if answer is None:
+    if answer is None or -ended in (signal.SIGXCPU, signal.SIGALRM):
         raise CaptureError(f"{path}: damaged: reading it was given up after {limit_s:.0f} s")
     if ended != 0:
         how = signal.Signals(-ended).name if ended < 0 else f"exit code {ended}"
@@ -163,7 +166,7 @@ def _child(path: Path, work: Callable[[], object], writing: int, limit_s: float)
             said: tuple[bool, object] = (True, work())
         except MemoryError:
             said = (False, CaptureError(f"{path}: damaged: reading it takes more than {MOST_BYTES >> 30} GB of memory"))
-        except BaseException as error:  # raised again in the parent
+        except BaseException as error:  # noqa: BLE001  # raised again in the parent
             said = (False, error)
         with os.fdopen(writing, "wb") as pipe:
             pipe.write(_pickled(path, said))
@@ -193,13 +196,22 @@ def _confine(limit_s: float) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     signal.signal(signal.SIGALRM, signal.SIG_DFL)
-    signal.alarm(int(limit_s) + 5)  # should the parent be killed
+    signal.alarm(math.ceil(WAITING * limit_s) + 1)  # should the parent be killed
     faulthandler.disable()
     gc.disable()  # collecting would close files of the parent
     silence = os.open(os.devnull, os.O_WRONLY)
     os.dup2(silence, 1)
     os.dup2(silence, 2)
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-    _, hard = resource.getrlimit(resource.RLIMIT_AS)
-    most = int(Path("/proc/self/statm").read_text().split()[0]) * os.sysconf("SC_PAGE_SIZE") + MOST_BYTES
-    resource.setrlimit(resource.RLIMIT_AS, (most if hard == resource.RLIM_INFINITY else min(most, hard), hard))
+    _bound(resource.RLIMIT_CPU, math.ceil(time.process_time() + limit_s))
+    pages = int(Path("/proc/self/statm").read_text().split()[0])
+    _bound(resource.RLIMIT_AS, pages * os.sysconf("SC_PAGE_SIZE") + MOST_BYTES)
+
+
+def _bound(what: int, most: int) -> None:
+    """Lower a limit of this process."""
+    import resource
+
+    soft, hard = resource.getrlimit(what)
+    given = [limit for limit in (soft, hard) if limit != resource.RLIM_INFINITY]
+    resource.setrlimit(what, (min([most, *given]), hard))

@@ -6,9 +6,9 @@ import difflib
 import re
 from collections.abc import Iterable
 
-
-_LONGEST_WORD, _LONGEST_LINE = 200, 4000
-_LONG_WORD, _LONG_LINE = re.compile(rf"[^\s/]{{{_LONGEST_WORD + 1},}}"), re.compile(rf"[^\n]{{{_LONGEST_LINE + 1},}}")
+_LONGEST_WORD, _LONGEST_LINE = 204, 4000
+_LONG_WORD = re.compile(rf"[^\s/]{{{_LONGEST_WORD + 1},}}")
+_LONG_LINE = re.compile(rf"[^\n]{{{_LONGEST_LINE + 1},}}")
 """Words are cut at slashes: a path is of use only as a whole."""
 
 

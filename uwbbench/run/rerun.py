@@ -7,7 +7,7 @@ Conventions
 -----------
 * Units are drawn by the operating system's random numbers: who forges a folder cannot know which.
 * The detector is made of the manifest's configuration and of the stages that are installed here; its identity, and the
-  hash of the capture's content, must be those of the run, so that what is compared is the same detector on the same data.
+  hash of the capture's content, must be those of the run: the same detector on the same data.
 * Times are not measured again: they never repeat.
 """
 

@@ -393,7 +393,7 @@ def _runs(content: Content) -> Page:
         Part("What could not be listed, timed or examined", tables=(Table("Failures", kinds, tuple(failures)),)),
     )
     lead = (
-        "Every run is consistent: its files have their hashes, names and identities are those of the manifest, and scores "
+        "Every run is consistent: files have their hashes, names and identities are those of the manifest, and scores "
         "follow from the stored detections. Detections themselves are taken as they are: that is no proof of them."
     )
     return Page("runs.html", "Runs", badge({one.source for one in content.sections}), lead, parts)
