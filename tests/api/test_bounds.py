@@ -11,7 +11,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from tests.api.written import capture_of
-from uwbbench.api import CaptureError, Obstacle, StoreError, Truth, open_capture, write_capture
+from uwbbench.api import CaptureError, Obstacle, StoreError, Truth, bounds, open_capture, write_capture
 from uwbbench.api.bounds import MOST_OBJECTS, MOST_TAPS, MOST_VERTICES, check_columns, check_unfolded
 from uwbbench.run.folder.files import read_json, read_parquet
 from uwbbench.run.folder.mapped import read_map
@@ -53,28 +53,44 @@ def test_more_objects_and_vertices_than_can_be_judged_are_refused(objects: int, 
         dataclasses.replace(capture_of(), truth=Truth((some,) * objects))
 
 
-def bomb(path: Path) -> None:
-    """300 MB of zeros."""
-    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
-        archive.writestr("re.npy", bytes(300 << 20))
+@pytest.fixture
+def small(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What is packed may unfold to a megabyte."""
+    monkeypatch.setattr(bounds, "_MOST_UNFOLDED", 1 << 20)
 
 
+@pytest.mark.usefixtures("small")
 def test_an_archive_that_unfolds_to_far_more_is_refused(tmp_path: Path) -> None:
-    bomb(tmp_path / "run.npz")
+    with zipfile.ZipFile(tmp_path / "run.npz", "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("re.npy", bytes(2 << 20))
     with pytest.raises(CaptureError, match=r"run\.npz: declares \d+ bytes"):
         open_recording(tmp_path / "run.npz")
     with pytest.raises(StoreError, match=r"run\.npz: declares \d+ bytes"):
         read_map(tmp_path / "run.npz")
 
 
+@pytest.mark.usefixtures("small")
 def test_a_parquet_file_that_unfolds_to_far_more_is_refused(tmp_path: Path) -> None:
-    pq.write_table(pa.table({"re": pa.array(np.zeros(40_000_000, np.int8))}), tmp_path / "run.parquet")
+    pq.write_table(pa.table({"re": pa.array(np.zeros(300_000, np.int8))}), tmp_path / "run.parquet")
     with pytest.raises(CaptureError, match=r"run\.parquet: declares \d+ bytes"):
         open_recording(tmp_path / "run.parquet")
     with pytest.raises(StoreError, match=r"run\.parquet: declares \d+ bytes"):
         read_parquet(tmp_path / "run.parquet")
     pq.write_table(pa.table({"re": [1.0]}), tmp_path / "small.parquet")
     check_columns(tmp_path / "small.parquet", pq.ParquetFile(tmp_path / "small.parquet").metadata)
+
+
+@pytest.mark.parametrize("place", ["position_m", "odometry_position_m", "the outline of 'box'"])
+def test_coordinates_beyond_all_that_can_be_seen_are_refused(place: str) -> None:
+    whole = capture_of()
+    far = np.full((len(whole), 3), 1e300)
+    parts = {
+        "position_m": {"trajectory": dataclasses.replace(whole.trajectory, position_m=far)},
+        "odometry_position_m": {"odometry_position_m": far},
+        "the outline of 'box'": {"truth": Truth((Obstacle("box", "metal", far[:3, :2]),))},
+    }
+    with pytest.raises(CaptureError, match=f"capture 'run 1': {place} has a coordinate of 1e\\+300 m"):
+        dataclasses.replace(whole, **parts[place])
 
 
 def test_a_device_in_place_of_a_file_is_not_read(tmp_path: Path) -> None:

@@ -12,6 +12,12 @@ from tests.api.written import capture_of
 from uwbbench.api import CaptureError, open_capture, write_capture
 
 
+@pytest.fixture(autouse=True)
+def here(monkeypatch):
+    """Files are read here; tests/fuzz is about the child that reads them first."""
+    monkeypatch.setenv("UWBBENCH_TRUST_FILES", "1")
+
+
 @pytest.fixture
 def path(tmp_path):
     """A correct file, to be spoilt."""

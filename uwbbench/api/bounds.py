@@ -5,6 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from uwbbench.api.arrays import FloatArray
 from uwbbench.api.errors import CaptureError
 from uwbbench.api.text import counted
 
@@ -16,6 +19,9 @@ MOST_RECEIVERS = 256
 MOST_OBJECTS = 2_000
 MOST_VERTICES = 10_000
 """Of one outline."""
+
+FARTHEST_M = 1e12
+"""Squares of coordinates up to here do not overflow, and nothing that is seen is as far."""
 
 _MOST_UNFOLDED = 256 << 20
 _MOST_RATIO = 50
@@ -53,6 +59,25 @@ def check_truth(objects: int, vertices: int) -> None:
         raise CaptureError(f"declares {counted(objects, 'object')}, of which there may be {MOST_OBJECTS}")
     if vertices > MOST_VERTICES:
         raise CaptureError(f"declares an outline of {vertices} vertices, which may have {MOST_VERTICES}")
+
+
+def check_places(what: str, position_m: FloatArray) -> None:
+    """Refuse coordinates beyond all that can be seen; NaN and infinity mean that a place is not known.
+
+    Parameters
+    ----------
+    what : str
+        Of which these are the coordinates, for the message.
+    position_m : array
+
+    Raises
+    ------
+    CaptureError
+        Naming the farthest.
+    """
+    far = np.abs(position_m, where=np.isfinite(position_m), out=np.zeros(position_m.shape))
+    if far.size and far.max() > FARTHEST_M:
+        raise CaptureError(f"{what} has a coordinate of {far.max():g} m; it may have {FARTHEST_M:g} m")
 
 
 def check_unfolded(where: str, declared_bytes: int, stored_bytes: int) -> None:

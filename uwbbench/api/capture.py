@@ -14,7 +14,7 @@ import numpy as np
 
 from uwbbench.api.anchors import Anchors
 from uwbbench.api.arrays import BoolArray, ComplexArray, FloatArray, lock_fields, locked
-from uwbbench.api.bounds import check_shape, check_truth
+from uwbbench.api.bounds import check_places, check_shape, check_truth
 from uwbbench.api.errors import CaptureError
 from uwbbench.api.frames import Frames
 from uwbbench.api.radar import Radar
@@ -179,6 +179,11 @@ class Capture(CaptureHeader):
         try:
             check_shape(frames, taps)
             check_truth(len(objects), max((obstacle.outline_m.shape[-2] for obstacle in objects), default=0))
+            check_places("position_m", self.trajectory.position_m)
+            if self.odometry_position_m is not None:
+                check_places("odometry_position_m", self.odometry_position_m)
+            for obstacle in objects:
+                check_places(f"the outline of '{obstacle.name}'", obstacle.outline_m)
         except CaptureError as error:
             raise CaptureError(f"capture '{self.name}': {error}") from None
         if taps != self.radar.taps:
