@@ -146,7 +146,7 @@ def _done(work: Callable[[], object]) -> None:
 def _heard(reading: int, limit_s: float) -> bytes | None:
     """All that a child says; nothing if it dies, None if it is still at work when its time is over."""
     end_s = time.monotonic() + limit_s
-    parts = []
+    parts: list[bytes] = []
     while True:
         left_s = end_s - time.monotonic()
         if left_s <= 0 or not select.select([reading], [], [], left_s)[0]:

@@ -224,8 +224,9 @@ def _come_through(path: Path) -> None:
             for part in (capture, capture.background):
                 samples = (part.preamble, part.sts1, part.sts2) if part is not None else ()
                 for array in samples:
-                    for start in range(0, array.shape[0] if isinstance(array, h5py.Dataset) else 0, 4096):
-                        array[start : start + 4096]
+                    if isinstance(array, h5py.Dataset):
+                        for start in range(0, len(array), 4096):
+                            array[start : start + 4096]
 
 
 def _opened(reader: _Reader, receiver: str, receivers: tuple[str, ...]) -> Capture:
