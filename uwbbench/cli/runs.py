@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -81,8 +80,6 @@ def run(
         changes["detectors"] = [str(Path(name).resolve()) if is_path(name) else name for name in detector]
     plan = read_experiment(experiment, changes, data_dir, quick=quick, seeds=seeds)
     _say_left_out(plan)
-    # Whoever interrupts need not be advised how joblib could do without the units that were under way.
-    warnings.filterwarnings("ignore", ".*adjusting the input task iterator", UserWarning)
     try:
         with _progress_bar(quiet) as advance:
             folder = run_experiment(

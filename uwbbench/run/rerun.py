@@ -13,11 +13,9 @@ Conventions
 
 from __future__ import annotations
 
-import os
 import random
 import uuid
 from collections.abc import Mapping, Sequence
-from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -26,17 +24,22 @@ import numpy as np
 
 from uwbbench.api.detections import Detections
 from uwbbench.api.errors import UwbbenchError
+from uwbbench.api.interruption import listening
 from uwbbench.api.text import one_line, printable
 from uwbbench.api.yaml_file import YamlFile
 from uwbbench.config.detector import DetectorConfig, check_detector
 from uwbbench.config.identity import from_results
 from uwbbench.config.source import CaptureRef, RunRef
 from uwbbench.measure.accuracy.rules import rules_on
+from uwbbench.measure.latency.machine import usable_cores
+from uwbbench.run.accuracy import AccuracyPass
+from uwbbench.run.crew import crew_of
 from uwbbench.run.folder import RunFolder
 from uwbbench.run.folder.journal import Entry
 from uwbbench.run.folder.scored import rules_of
-from uwbbench.run.plan import Unit
-from uwbbench.run.unit import Finished, Job, run_unit
+from uwbbench.run.limits import Allowance, LimitsModel
+from uwbbench.run.plan import LONGEST_REASON, Unit
+from uwbbench.run.unit import Finished, Job
 
 RELATIVE, ABSOLUTE = 1e-6, 1e-9
 """Numbers that differ by less are equal: another processor may round otherwise."""
@@ -83,37 +86,44 @@ def rerun(folder: RunFolder, number: int, roots: Sequence[Path]) -> Rerun:
     read_only = {one["name"] for one in folder.manifest["experiment"]["detectors"] if from_results(one)}
     done = [e for e in folder.entries() if e.kind == "accuracy" and e.status == "done" and e.detector not in read_only]
     drawn = random.SystemRandom().sample(done, min(number, len(done)))
-    problems, identical, equal = [], 0, 0
-    if not drawn:
-        problems.append("holds no unit that could be run again")
-    for entry in drawn:
+    outcomes: dict[str, str | None] = {}
+    jobs = []
+    session = uuid.uuid4().hex
+    for entry in sorted(drawn, key=lambda one: (one.dataset, one.capture)):
         try:
-            found = _again(folder, entry, roots)
-            different = _different(folder, entry, found)
-        except (UwbbenchError, KeyError, TypeError, ValueError) as error:
-            different = f"was not run again: {one_line(error, 400)}"
-        if different is None:
-            identical += 1
-        elif different == "":
-            equal += 1
-        else:
-            problems.append(f"{_about(entry)}: {different}")
-    return Rerun(tuple(map(_about, drawn)), identical, equal, tuple(problems))
+            jobs.append(_job(folder, entry, roots, session))
+        except (UwbbenchError, StopIteration, KeyError, TypeError, ValueError) as error:
+            outcomes[entry.unit] = f"cannot be run again: {one_line(error, LONGEST_REASON)}"
+    limits, entries = LimitsModel(), {entry.unit: entry for entry in drawn}
+    with listening(), crew_of(usable_cores(), limits.memory_mb) as hands:
+        for again in AccuracyPass(hands, jobs, Allowance(limits)).finished():
+            entry = entries[again.entry.unit]
+            try:
+                outcomes[entry.unit] = _different(folder, entry, again)
+            except (UwbbenchError, KeyError, TypeError, ValueError) as error:
+                outcomes[entry.unit] = f"cannot be compared: {one_line(error, LONGEST_REASON)}"
+    problems = tuple(f"{_about(entry)}: {text}" for entry in drawn if (text := outcomes[entry.unit]))
+    return Rerun(
+        units=tuple(map(_about, drawn)),
+        identical=sum(outcome is None for outcome in outcomes.values()),
+        equal=sum(outcome == "" for outcome in outcomes.values()),
+        problems=problems if drawn else ("holds no unit that could be run again",),
+    )
 
 
-def _again(folder: RunFolder, entry: Entry, roots: Sequence[Path]) -> Finished:
-    """What a unit gives here and now, in a process that it may take down."""
-    from joblib import Parallel, delayed
+def _job(folder: RunFolder, entry: Entry, roots: Sequence[Path], session: str) -> Job:
+    """A unit as the manifest describes it, with what is installed here.
 
+    Raises
+    ------
+    UwbbenchError
+        If its detector is not installed, or its unit has another name.
+    """
     experiment = folder.manifest["experiment"]
     unit = Unit("accuracy", _detector(experiment, entry.detector), entry.dataset, _reference(folder, entry, roots))
-    rules = tuple(rules_on(rules_of(experiment), entry.dataset))
-    job = Job(unit, rules, uuid.uuid4().hex, os.getpid())
-    try:
-        finished: Finished = Parallel(n_jobs=2)([delayed(run_unit)(job)])[0]
-    except BrokenProcessPool as error:
-        raise UwbbenchError("its process died") from error
-    return finished
+    if unit.id != entry.unit:
+        raise UwbbenchError("its unit is not the one that the manifest describes")
+    return Job(unit, tuple(rules_on(rules_of(experiment), entry.dataset)), session)
 
 
 def _detector(experiment: Mapping[str, Any], name: str) -> DetectorConfig:
