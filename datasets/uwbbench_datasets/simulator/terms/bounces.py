@@ -132,7 +132,7 @@ class WallBounce(Term[Params]):
                     azimuths.append(view.azimuth_rad(end[:, None])[:, 0])
         if not lengths:
             return None
-        return _paths(view, *(np.stack(part, axis=1) for part in (lengths, strengths, azimuths)))
+        return _paths(view, np.stack(lengths, axis=1), np.stack(strengths, axis=1), np.stack(azimuths, axis=1))
 
 
 def _over_both(near: Face, far: Face, view: View) -> tuple[FloatArray, BoolArray, FloatArray]:
