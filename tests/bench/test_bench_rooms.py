@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import rooms
 
-from uwbbench import load_detector, open_dataset, score, write_capture
+from uwbbench import load_detector, open_capture, open_dataset, score, write_capture
 from uwbbench.api import Trajectory, UwbbenchError
 
 
@@ -28,12 +28,11 @@ def unit(folder):
 def test_counts_by_motion_and_material_add_up_to_the_scoring(unit) -> None:
     detector = load_detector("oracle")
     row = rooms.counted(detector, unit, 0.2)
-    from uwbbench import open_capture
-
     capture = open_capture(unit.file)
     block = score(detector.run(capture), capture, "object", 0.2).filtering
     assert (sum(row["tp"]), sum(row["fp"]), sum(row["fn"])) == (block.tp, block.fp, block.fn)
     assert row["materials"] == {"metal": [block.tp, block.tp + block.fn]}
+    assert row["chance"] == pytest.approx(block.chance_recall * (block.tp + block.fn))
     assert block.tp > 50
 
 
@@ -52,6 +51,7 @@ def row(tp: int, fp: int, fn: int) -> dict[str, object]:
         "fn": [0, 0, fn],
         "materials": {"metal": [tp, tp + fn]},
         "kinds": {"noise": fp},
+        "chance": 0.1 * (tp + fn),
         "errors": [0.02 * tp, 0.02 * tp, 0.0004 * tp, tp],
     }
 
@@ -63,6 +63,7 @@ def test_counts_are_added_up_before_a_ratio_is_taken() -> None:
     assert found["f1_worst"] == 0
     assert found["recall_of"] == {"metal": pytest.approx(0.9)}
     assert found["kinds"] == {"noise": 20}
+    assert found["chance_recall"] == pytest.approx(0.1)
     assert (found["bias_m"], found["mae_m"]) == (pytest.approx(0.02), pytest.approx(0.02))
     assert found["sd_m"] == pytest.approx(0.0, abs=1e-6)
     assert found["detector"] == "mine"
