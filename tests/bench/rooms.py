@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import argparse
 import hashlib
+import inspect
 import json
 import os
 import sys
@@ -174,7 +175,8 @@ def gathered(every: Sequence[Unit], detectors: Sequence[str], cache: Path, proce
     gate_m : float
     """
     cache.mkdir(parents=True, exist_ok=True)
-    scoring = source_hash("uwbbench.measure.accuracy.causes") + hashlib.sha256(Path(__file__).read_bytes()).hexdigest()
+    counting = "".join(map(inspect.getsource, (motions, counted)))
+    scoring = source_hash("uwbbench.measure.accuracy.causes") + hashlib.sha256(counting.encode()).hexdigest()
     identities = {name: load_detector(name).identity for name in detectors}
     hashes = {file: hashlib.sha256(file.read_bytes()).hexdigest() for file in {unit.file for unit in every}}
     places = {
@@ -273,8 +275,8 @@ def lines(summaries: Sequence[Row]) -> Iterator[str]:
         parts += [", ".join(f"{kind} {count}" for kind, count in one["kinds"].items())]
         yield "| " + " | ".join(parts) + " |"
     yield ""
-    yield "(chance): recall of as many random ranges. Columns of motion: P/R/F1. Bias, SD and MAE of true detections in cm."
-    yield "worst: F1 of the worst capture."
+    yield "(chance): recall of as many random ranges. Columns of motion: P/R/F1. Worst: F1 of the worst capture."
+    yield "Bias, SD and MAE of true detections in cm."
 
 
 def main() -> int:
