@@ -196,8 +196,8 @@ def doubt(located: Located, echoes: Located | None = None) -> str:
         )
     if abs(located.delay_s) > FARTHEST_S:
         return (
-            f"the direct path does not rise like the pulse, which places it {located.delay_s * cm:+.0f} cm of range from "
-            "its crest, farther than ringing moves one"
+            f"the direct path does not rise like the pulse, which places it {located.delay_s * cm:+.0f} cm of range "
+            "from its crest, farther than ringing moves one"
         )
     if located.sd_s > MOST_UNSURE_S:
         return f"it is unsure by {located.sd_s * cm:.1f} cm of range, more than {MOST_UNSURE_S * cm:.1f}"

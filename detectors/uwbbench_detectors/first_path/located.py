@@ -89,9 +89,9 @@ class KnownPulseFirstPath(LocatedFirstPath[KnownPulseParams]):
     """Direct path by a pulse that is known, where the radar does not contradict it; an opt-in.
 
     From frame 48 on, whenever the number of frames has doubled, the delay of the direct path behind the crest is the
-    mean of its posterior in the running template (:func:`uwbbench.api.locate`). It is refused, with a note, and the
-    zero stays at the crest, where the template does not fit pulse and ringing, where it leaves the direct path unsure
-    by more than 1.5 cm of range, or where the pulse of moving echoes places it elsewhere. **Without moving echoes a
+    mean of its posterior in the running template (:func:`uwbbench.api.direct_path.locate`). It is refused, with a note,
+    and the zero stays at the crest, where the template does not fit pulse and ringing, where it leaves the direct path
+    unsure by more than 1.5 cm of range, or where the pulse of moving echoes places it elsewhere. **Without moving echoes a
     tail of the pulse itself cannot be told from ringing**: the template is the same, and the zero is off by what the
     tail moves it, 4 cm for one of -9 dB behind one tap. It takes about a third of a millisecond a frame.
     """
