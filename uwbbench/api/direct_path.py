@@ -37,7 +37,7 @@ WORST_MISFIT = 1.5
 """Misfit beyond which the template rises otherwise than the pulse: 0.2 to 0.8 where the pulse is right, 3 to 8 with a
 Gaussian of 3.2 ns in place of a raised cosine of 2 ns or the other way round."""
 
-_REACH, _PHASES = 8, 512
+_REACH, _PHASES, _SEARCHED = 8, 512, 6
 _PULSE_S: FloatArray = np.arange(-56.0, 57.0) * 0.125e-9
 _GROUPS = 4
 
@@ -256,7 +256,7 @@ class DirectPath:
             return None
         unit: ComplexArray = np.asarray(samples.astype(complex) / top)
         magnitude = np.abs(unit)
-        place = self._leading + int(magnitude[self._leading : self._leading + 8].argmax())
+        place = self._leading + int(magnitude[self._leading : self._leading + _SEARCHED].argmax())
         if not magnitude[place] >= 10 * np.median(magnitude):
             return None
         crest = crest_near(unit, place)
