@@ -123,7 +123,7 @@ class EchoPulseFirstPath(LocatedFirstPath[Params]):
     """Direct path by the pulse of echoes that move against the robot, measured on the way.
 
     Echoes hold no ringing, so that their mean is the pulse of the radar, tails and all. Once 40 of them stood 22 dB
-    above the noise, 6 ns behind the crest, and 15 dB above all others, and whenever their number has doubled, they
+    above the noise, 6 ns behind the crest, and 20 dB above all others, and whenever their number has doubled, they
     locate the direct path as in ``first_path.known_pulse``; until then, and where the answer is unsure by more than 1.5
     cm of range, the zero stays at the crest. The zero steps by up to some centimetres where it is found. It takes about
     a third of a millisecond a frame.
