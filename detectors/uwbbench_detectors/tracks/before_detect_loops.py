@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from uwbbench.api import BoolArray, FloatArray, IntArray, compiled, inlined
+from uwbbench.api import BoolArray, FloatArray, IntArray, compiled
 
 (
     TAPS_A_SECOND,
@@ -33,7 +33,7 @@ have gone since the last whole one."""
 CARRIED = 3
 
 
-@inlined
+@compiled
 def weigh(
     amplitude: FloatArray, noise: float, start: int, level: FloatArray, gain: float, at: FloatArray
 ) -> FloatArray:
@@ -63,13 +63,14 @@ def weigh(
     return evidence
 
 
-@inlined
+@compiled
 def reached(gathered: FloatArray, reach: int) -> FloatArray:
     """Largest value (taps,) within ``reach`` taps of each, doubling the span that is covered."""
     taps = len(gathered)
     span = 2 * reach + 1
     padded = np.zeros(taps + 2 * reach)  # nothing has been gathered outside of the frame
-    padded[reach : reach + taps] = gathered
+    for tap in range(taps):  # a slice assigned at once would take seconds to compile
+        padded[reach + tap] = gathered[tap]
     covered, length = 1, taps + 2 * reach
     while covered < span:
         step = min(covered, span - covered)

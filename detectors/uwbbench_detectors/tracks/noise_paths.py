@@ -2,8 +2,8 @@
 
 A cell of noise has the power ``x`` in units of the noise, exponentially distributed, and the evidence
 ``l = clip(10 log10(x / x0), lowest, highest)``. From frame to frame a path goes on to one of ``n`` cells. The largest
-sum of evidence over all paths that end in a cell, started anew wherever it would be negative, exceeds ``t`` in a frame
-with a probability of at most (union bound over all paths of k frames, and Markov's inequality for each of them)
+sum of evidence over all paths that end in a cell, started anew wherever it would be negative, exceeds ``t`` with a
+probability of at most (union bound over all paths of k frames, and Markov's inequality for each of them)
 
     ``sum over k of n^(k-1) M(theta)^k exp(-theta t) = M / (1 - n M) exp(-theta t)``, ``M(theta) = E[exp(theta l)]``,
 
