@@ -91,7 +91,7 @@ class Stream:
     @property
     def needs(self) -> frozenset[str]:
         """What the stages need of the capture."""
-        return frozenset().union(*(stage.needs for stage in self.stages))
+        return frozenset().union(*(stage.needs_with(stage.params) for stage in self.stages))
 
     @property
     def fused(self) -> bool:

@@ -8,7 +8,7 @@ from typing import ClassVar, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from uwbbench.api import Block, BoolArray, Filter, Limit, LimitFilter, Params, ports
+from uwbbench.api import Block, BoolArray, Filter, Limit, LimitFilter, Params, Radar, ports
 
 
 def _check_order(minimum: float | None, maximum: float | None, unit: str) -> None:
@@ -158,3 +158,74 @@ class ProbabilityFilter(LimitFilter[ProbabilityFilterParams]):
 
     consumes: ClassVar[frozenset[str]] = ports("detections", "probability")
     limits: ClassVar[Mapping[str, Limit]] = {"minimum": Limit("probability", "least")}
+
+
+class AzimuthFilterParams(Params):
+    """Sector."""
+
+    maximum_deg: float = Field(47.0, gt=0, description="Largest azimuth from boresight, to either side.")
+
+
+class AzimuthFilter(Filter[AzimuthFilterParams]):
+    """Keep what lies in a sector around the boresight."""
+
+    consumes: ClassVar[frozenset[str]] = ports("detections", "azimuth_rad")
+
+    def keep(self, block: Block) -> BoolArray:
+        """Mask of the detections in the sector."""
+        return np.asarray(np.abs(block.detections.azimuth_rad) <= np.deg2rad(self.params.maximum_deg))
+
+
+class AngleCostFilterParams(Params):
+    """Largest disagreement."""
+
+    maximum: float = Field(
+        1.5,
+        ge=0,
+        description="Sum of the squared deviations of Doppler and phase difference from those of one direction, in "
+        "standard deviations: of two measurements of one unknown, below 1.5 in 78 % of honest echoes by chance, in more "
+        "where the assumed errors are wide.",
+    )
+
+
+class AngleCostFilter(LimitFilter[AngleCostFilterParams]):
+    """Keep what arrives from the direction that its Doppler speaks of, as echoes by way of one reflection do."""
+
+    consumes: ClassVar[frozenset[str]] = ports("detections", "angle_cost")
+    limits: ClassVar[Mapping[str, Limit]] = {"maximum": Limit("angle_cost", "most")}
+
+
+class ReflectionFilterParams(Params):
+    """Weakest mirror."""
+
+    minimum_db: float = Field(
+        -16.0,
+        description="Amplitude relative to that of a perfect mirror. Plaster and wood reflect -8 to -15 dB, and what is "
+        "smaller than the first Fresnel zone less; isolation between the antennas adds to all amplitudes, 6 to 12 dB on "
+        "the robots that are known.",
+    )
+
+
+class ReflectionFilter(Filter[ReflectionFilterParams]):
+    """Keep what reflects well enough for an obstacle, whatever its range.
+
+    A perfect mirror at range r shows the transmitter's image at the distance 2 r, while the direct path has flown the
+    baseline D: in frames that are relative to the direct path its amplitude is ``D / (2 r)``, so that
+    ``20 log10(2 r A / D)`` is its reflection in decibels, plus the isolation between the antennas. Needs frames that
+    are scaled to the direct path, as by ``align.template``.
+
+    Where transmitter and receiver are in one place all detections pass, with a note.
+    """
+
+    consumes: ClassVar[frozenset[str]] = ports("detections", "amplitude", "range_m")
+
+    def open(self, radar: Radar) -> None:
+        """Look up the baseline."""
+        super().open(radar)
+        if radar.baseline_length_m == 0:
+            self.note("filter.reflection left out: transmitter and receiver are in one place, and no baseline scales it")
+        self.least = radar.baseline_length_m / 2 * 10 ** (self.params.minimum_db / 20)
+
+    def keep(self, block: Block) -> BoolArray:
+        """Mask of the detections that reflect well enough."""
+        return np.asarray(block.detections["amplitude"] * block.detections.range_m >= self.least)

@@ -1,0 +1,1 @@
+"""Frames of a moving radar added up, and what is read off the sums."""
