@@ -1,12 +1,12 @@
-"""Detectors on folders of simulated rooms: scores by generator, by motion and by material, and what false detections are.
+"""Detectors on folders of simulated rooms: scores by generator, motion and material, and kinds of false detections.
 
     python tests/bench/rooms.py --captures own=rooms/own --captures other=rooms/other champion cfar-os mine.yaml
 
-Each folder holds the capture files of one generator of rooms. Scoring is ``object``: detections and visible obstacles of
-a frame are matched one to one in range. Counts are added up over captures before a ratio is taken. The interval of F1 is
-the central 95 % over captures drawn with replacement, from each generator as many as it has; with a dozen captures it is
-too narrow rather than too wide. A robot *moves* where it is faster than 1 cm/s, else *turns* where its heading
-changes by more than 1 degree/s, and else *stands*. What was found on a file by a detector is kept in a cache,
+Each folder holds the capture files of one generator of rooms. Scoring is ``object``: detections and visible obstacles
+of a frame are matched one to one in range. Counts are added up over captures before a ratio is taken. The interval of
+F1 is the central 95 % over captures drawn with replacement, from each generator as many as it has; with a dozen
+captures it is too narrow rather than too wide. A robot *moves* where it is faster than 1 cm/s, else *turns* where its
+heading changes by more than 1 degree/s, and else *stands*. What was found on a file by a detector is kept in a cache,
 until the file, the detector with its stages, or the scoring changes.
 """
 
@@ -76,7 +76,7 @@ class Job:
 
 
 def motions(track: Trajectory) -> IntArray:
-    """Index into :data:`MOTIONS` of each frame (frames,), from the step that leads to it; the first is as the second."""
+    """Index into :data:`MOTIONS` of each frame (frames,), from the step that leads to it."""
     seconds = np.maximum(np.diff(track.timestamp_s), 1e-9)
     speed = np.linalg.norm(np.diff(track.position_m, axis=0), axis=1) / seconds
     turn = np.abs(np.angle(np.exp(1j * np.diff(track.yaw_rad)))) / seconds
@@ -284,7 +284,7 @@ def lines(summaries: Sequence[Row]) -> Iterator[str]:
         parts += [", ".join(f"{kind} {count}" for kind, count in one["kinds"].items())]
         yield "| " + " | ".join(parts) + " |"
     yield ""
-    yield "P / R / F1 in the columns of motion; bias, SD and MAE of true detections in cm; worst: F1 of the worst capture."
+    yield "P/R/F1 in the columns of motion; bias, SD and MAE of true detections in cm; worst: F1 of the worst capture."
 
 
 def main() -> int:
