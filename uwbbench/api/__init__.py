@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from uwbbench.api.compiling import compiled, inlined
     from uwbbench.api.dataset import Card, Dataset, DatasetFile, DatasetFolder
     from uwbbench.api.detections import COLUMNS, Detections
+    from uwbbench.api.direct_path import DirectPath, Located, doubt, stated_pulse
     from uwbbench.api.drive import Drive, compose, odometry_of, relative
     from uwbbench.api.errors import (
         CaptureError,
@@ -76,6 +77,7 @@ _HOME = {
     "compiling": ("compiled", "inlined"),
     "dataset": ("Card", "Dataset", "DatasetFile", "DatasetFolder"),
     "detections": ("COLUMNS", "Detections"),
+    "direct_path": ("DirectPath", "Located", "doubt", "stated_pulse"),
     "drive": ("Drive", "compose", "odometry_of", "relative"),
     "errors": ("CaptureError", "ConfigError", "PluginError", "ScoringError", "StoreError", "UwbbenchError", "nearest"),
     "filters": ("Limit", "LimitFilter", "RankFilter", "RankParams"),
@@ -133,6 +135,7 @@ __all__ = [
     "DatasetFile",
     "DatasetFolder",
     "Detections",
+    "DirectPath",
     "Drive",
     "EchoFading",
     "EchoTail",
@@ -150,6 +153,7 @@ __all__ = [
     "LearnedParams",
     "Limit",
     "LimitFilter",
+    "Located",
     "Map",
     "MapOutcome",
     "Mapped",
@@ -201,6 +205,7 @@ __all__ = [
     "compiled",
     "compose",
     "direction",
+    "doubt",
     "exact_ulps",
     "expect_arrays",
     "find_config",
@@ -222,6 +227,7 @@ __all__ = [
     "rotate_z",
     "segments_cross",
     "simulated_recording",
+    "stated_pulse",
     "to_world",
     "with_values",
     "wrap_angle",

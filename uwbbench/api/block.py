@@ -57,10 +57,12 @@ class Block:
 
     def replace(self, **parts: Any) -> Block:
         """Block with some parts replaced."""
-        if not parts.keys() <= self.__dict__.keys():
+        held = self.__dict__.copy()
+        held.update(parts)
+        if len(held) > len(self.__dict__):
             raise TypeError(f"a block has no {', '.join(parts.keys() - self.__dict__.keys())}")
         made = object.__new__(Block)  # several times cheaper than dataclasses.replace, in every stage of every call
-        made.__dict__.update(self.__dict__, **parts)
+        object.__setattr__(made, "__dict__", held)
         return made
 
     def with_columns(self, **columns: Any) -> Block:

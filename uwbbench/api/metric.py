@@ -105,6 +105,9 @@ class Metric:
         Place among the columns of a table; equal ones stand in the order in which they are listed.
     brief : bool
         Whether a default one also stands in tables that must be narrow: in the terminal, and by channel and material.
+    beside : str
+        Registered name of the metric that it completes, as bias and scatter complete a mean absolute error: where
+        tables are narrow it stands wherever that one does.
     headline : int or None
         Place among the few default ones that are charted; the first three of them are compared in pairs, and the first
         that can ranks. Of equal ones those come first that only this scoring has. None: not among them. Listed ones
@@ -129,6 +132,7 @@ class Metric:
     default: ClassVar[bool] = False
     order: ClassVar[int] = 100
     brief: ClassVar[bool] = True
+    beside: ClassVar[str] = ""
     headline: ClassVar[int | None] = None
     kind: ClassVar[Kind] = "other"
     level: ClassVar[float] = math.nan

@@ -224,6 +224,8 @@ class View:
         Phase in radians of the second antenna over the first, at azimuths of any shape.
     pulse : Pulse
     anchors : tuple of SceneAnchor
+    pulse_copies : tuple of (float, complex)
+        Copies that follow every pulse: delay in seconds, and strength with phase against the pulse.
     """
 
     radar: Radar
@@ -240,6 +242,7 @@ class View:
     array_phase: Callable[[FloatArray], FloatArray]
     pulse: Pulse
     anchors: tuple[SceneAnchor, ...] = ()
+    pulse_copies: tuple[tuple[float, complex], ...] = ()
 
     def __len__(self) -> int:
         return len(self.timestamp_s)

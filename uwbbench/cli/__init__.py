@@ -16,6 +16,7 @@ from typer.core import TyperGroup
 import uwbbench
 from uwbbench.api.errors import UwbbenchError
 from uwbbench.cli import (
+    calibrate,
     data,
     evaluate,
     export,
@@ -91,6 +92,7 @@ def _start(
 for _group in (
     runs,
     evaluate,
+    calibrate,
     time,
     tune,
     train,

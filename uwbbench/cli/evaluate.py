@@ -1,9 +1,7 @@
-"""Commands that run one detector on one capture: ``score``, ``detect``, ``calibrate``."""
+"""Commands that run one detector on one capture: ``score``, ``detect``."""
 
 from __future__ import annotations
 
-import math
-import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -153,46 +151,7 @@ def detect(
     render.print_notes(detections.notes)
 
 
-def calibrate(
-    capture: options.CaptureFile,
-    detector: options.Detector,
-    output: Annotated[Path, typer.Option("--output", "-o", metavar="FILE.yaml", help="Detector file to write.")],
-    receiver: options.Receiver = None,
-    settings: options.Settings = None,
-) -> None:
-    """Write a detector corrected for its own offsets.
-
-    The offsets of range and azimuth are measured on a capture whose truth is known.
-    """
-    import yaml
-
-    import uwbbench
-    from uwbbench.api.override import parse_settings
-    from uwbbench.run.folder.files import write_text
-
-    options.format_of(output, ".yaml", ".yml")
-    opened, pipeline = _open(capture, receiver, detector, settings)
-    measured = uwbbench.calibrate(pipeline, opened)
-    name = f"{pipeline.name}-calibrated"
-    changes = parse_settings(settings or ()) | measured.as_settings()
-    head = {"schema": 1, "extends": _seen_from(output.parent, detector), "name": name, "set": changes}
-    label = "SIMULATED capture" if opened.source == "simulated" else "capture"
-    offsets = f"range offset {measured.range_bias_m:+.4f} m"
-    if measured.azimuth_bias_rad is not None:
-        offsets += f", azimuth offset {math.degrees(measured.azimuth_bias_rad):+.2f} degrees"
-    origin = f"measured on {label} '{opened.name}' from {measured.n} detections: {offsets}"
-    write_text(output, f"# {origin}\n{yaml.safe_dump(head, sort_keys=False, allow_unicode=True)}")
-    typer.echo(f"{origin}; detector '{name}' written to {output}", err=True)
-
-
-def _seen_from(folder: Path, detector: str) -> str:
-    """Detector as a file in another folder must name it."""
-    is_name = not detector.endswith((".yaml", ".yml"))
-    return detector if is_name else os.path.relpath(detector, folder)
-
-
 def register(app: typer.Typer) -> None:
     """Add these commands."""
     app.command(epilog="Example: uwbbench score run.h5 --detector paper --scoring object --json")(score)
     app.command(epilog="Example: uwbbench detect run.h5 --detector cfar-os -o found.csv")(detect)
-    app.command(epilog="Example: uwbbench calibrate run.h5 --detector paper -o calibrated.yaml")(calibrate)

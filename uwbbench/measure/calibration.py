@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -12,11 +13,15 @@ from uwbbench.api import registry
 from uwbbench.api.capture import Capture
 from uwbbench.api.errors import ConfigError, ScoringError
 from uwbbench.api.geometry import wrap_angle
+from uwbbench.api.radar import Radar
 from uwbbench.api.stage import Stage
 from uwbbench.detect.pipeline import Pipeline
 
 MINIMUM_MATCHES = 10
 """Fewest detections that an offset is taken from."""
+
+NORMAL_MEDIAN = 0.6745
+"""Median distance of normal errors from their mean, in standard deviations."""
 
 
 @dataclass(frozen=True)
@@ -33,12 +38,22 @@ class Calibration:
         Detections that the range offset was taken from.
     stages : mapping
         The detector's stages with its parameters for the channel of the capture, by the names of their steps.
+    range_scatter_m : float
+        Spread of the range errors around the offset, which stays: 1.48 times their median distance from it.
+    range_sd_m : float
+        How sure the offset is: its standard deviation. NaN where that is not known.
+    zeros_s : mapping
+        Delay of the direct path behind its crest by response, where it was measured itself; the offsets then replace
+        those of the detector, and else are added to them.
     """
 
     range_bias_m: float
     azimuth_bias_rad: float | None
     n: int
     stages: Mapping[str, Stage[Any]] = field(default_factory=dict, repr=False)
+    range_scatter_m: float = math.nan
+    range_sd_m: float = math.nan
+    zeros_s: Mapping[str, float] = field(default_factory=dict)
 
     def as_settings(self) -> dict[str, float]:
         """Values for the ``set:`` of a detector that extends the calibrated one, by path.
@@ -52,26 +67,69 @@ class Calibration:
             If not exactly one step takes an offset off the range or off the azimuth, or nothing can be added to what
             it takes off: a preset instead of a number, say, or an offset of the phase difference.
         """
-        settings = self._added("range_m", self.range_bias_m)
+        by_response = self._of_responses()
+        settings = by_response or self._added("range_m", self.range_bias_m)
         return (
             settings if self.azimuth_bias_rad is None else settings | self._added("azimuth_rad", self.azimuth_bias_rad)
         )
 
-    def _added(self, column: str, offset: float) -> dict[str, float]:
-        """Values by path with which the detector takes an offset more off a column."""
+    def _of_responses(self) -> dict[str, float]:
+        """Values by path where steps of the detector take the zeros of responses; they leave the range no offset."""
+        settings: dict[str, float] = {}
+        for response, zero_s in self.zeros_s.items():
+            for label, changed in self._changes(f"{response}_delay_s", zero_s).items():
+                settings |= {f"pipeline.{label}.params.{name}": value for name, value in changed.items()}
+        return settings
+
+    def _changes(self, column: str, offset: float) -> dict[str, dict[str, float]]:
+        """New values of the parameters of the steps that take an offset off a column, by the names of the steps."""
         changes: dict[str, dict[str, float]] = {}
         for label, stage in self.stages.items():
             try:
-                changes[label] = stage.recalibrated(column, offset)
+                changed = stage.recalibrated(column, offset)
+                known = stage.recalibrated(column, 0.0) if self.zeros_s else {}
             except ConfigError as error:
                 raise ConfigError(f"pipeline.{label}.params.{error}") from error
-        steps = [label for label, changed in changes.items() if changed]
-        if len(steps) != 1:
+            if changed:
+                changes[label] = {name: value - known.get(name, 0.0) for name, value in changed.items()}
+        return changes
+
+    def _added(self, column: str, offset: float) -> dict[str, float]:
+        """Values by path with which the detector takes an offset more off a column."""
+        changes = self._changes(column, offset)
+        if len(changes) != 1:
             raise ConfigError(
-                f"the detector has {len(steps)} steps that take an offset off {column}; "
+                f"the detector has {len(changes)} steps that take an offset off {column}; "
                 "an offset can be set where there is one"
             )
-        return {f"pipeline.{steps[0]}.params.{name}": value for name, value in changes[steps[0]].items()}
+        return {
+            f"pipeline.{label}.params.{name}": value for label, set_ in changes.items() for name, value in set_.items()
+        }
+
+
+def settings_by_receiver(calibrations: Mapping[str, Calibration]) -> dict[str, Any]:
+    """Values for the ``set:`` of a detector for a robot with several receivers.
+
+    Parameters
+    ----------
+    calibrations : mapping of str to Calibration
+        By receiver. Of a single one the values are those of :meth:`Calibration.as_settings`, for all receivers.
+
+    Raises
+    ------
+    ConfigError
+        As :meth:`Calibration.as_settings`; if the azimuth of some receivers alone could be measured, too.
+    """
+    each = {receiver: one.as_settings() for receiver, one in calibrations.items()}
+    if len(each) == 1:
+        return dict(*each.values())
+    if len({frozenset(settings) for settings in each.values()}) > 1:
+        without = [receiver for receiver, one in calibrations.items() if one.azimuth_bias_rad is None]
+        raise ConfigError(
+            f"the azimuth could not be measured on {', '.join(without)}: calibrate the receivers one by one"
+        )
+    paths = next(iter(each.values()))
+    return {path: {receiver: settings[path] for receiver, settings in each.items()} for path in paths}
 
 
 def calibrate(detector: Pipeline, capture: Capture, gate_m: float = 1.0) -> Calibration:
@@ -128,20 +186,33 @@ def calibrate(detector: Pipeline, capture: Capture, gate_m: float = 1.0) -> Cali
             f"capture '{capture.name}'; calibration needs {MINIMUM_MATCHES}"
         )
     target = distance_m[near].argmin(axis=1)
+    errors_m = error_m[near, target]
+    range_bias_m = float(np.median(errors_m))
+    scatter_m = float(np.median(np.abs(errors_m - range_bias_m)) / NORMAL_MEDIAN)
     azimuth_error = wrap_angle(detections.azimuth_rad[near] - sight.azimuth_rad[detections.frame[near], target])
     azimuth_error = azimuth_error[np.isfinite(azimuth_error)]
     return Calibration(
-        range_bias_m=float(np.median(error_m[near, target])),
+        range_bias_m=range_bias_m,
         azimuth_bias_rad=float(np.median(azimuth_error)) if len(azimuth_error) >= MINIMUM_MATCHES else None,
         n=len(near),
-        stages=_stages(detector, capture.radar.channel),
+        stages=stages_of(detector, capture.radar),
+        range_scatter_m=scatter_m,
     )
 
 
-def _stages(detector: Pipeline, channel: int | None) -> dict[str, Stage[Any]]:
-    """A detector's stages with its parameters for a channel, not opened."""
+def stages_of(detector: Pipeline, radar: Radar) -> dict[str, Stage[Any]]:
+    """A detector's stages with its parameters for a receiver, not opened, by the names of their steps.
+
+    Parameters
+    ----------
+    detector : Pipeline
+    radar : Radar
+        Of the receiver.
+    """
     stages = {}
     for step in detector.config.steps:
         cls = registry.load_plugin("stages", step.use)
-        stages[step.label] = cls(cls.params_type().model_validate(step.params_for(channel)[0]))
+        stage = cls(cls.params_type().model_validate(step.params_for(radar.channel)[0]))
+        stage.radar = radar  # an offset may be that of a receiver
+        stages[step.label] = stage
     return stages

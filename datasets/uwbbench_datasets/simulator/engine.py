@@ -319,6 +319,8 @@ def add_paths(antennas: ComplexArray, paths: Paths, view: View, name: str = "pat
     CaptureError
         If a delay or amplitude is not finite.
     """
+    if view.pulse_copies:
+        paths = _with_copies(paths, view)
     shape = (len(view), np.shape(paths.delay_s)[1])
     if not shape[1]:
         return
@@ -341,6 +343,16 @@ def add_paths(antennas: ComplexArray, paths: Paths, view: View, name: str = "pat
             added = _scattered(strength[rows], tap[rows], reach, taps, view)
         antennas.real[:, rows] += added[0::2]
         antennas.imag[:, rows] += added[1::2]
+
+
+def _with_copies(paths: Paths, view: View) -> Paths:
+    """Paths with the copies that follow each pulse."""
+    copies = [(0.0, 1.0 + 0j), *view.pulse_copies]
+    return Paths(
+        np.concatenate([paths.delay_s + delay_s for delay_s, _ in copies], axis=1),
+        np.concatenate([paths.amplitude * strength for _, strength in copies], axis=1),
+        np.concatenate([paths.azimuth_rad] * len(copies), axis=1),
+    )
 
 
 def _scattered(strength: FloatArray, tap: FloatArray, reach: float, taps: int, view: View) -> FloatArray:

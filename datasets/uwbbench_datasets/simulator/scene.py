@@ -242,6 +242,25 @@ def read_scenes(path: Path, changes: Mapping[str, Any] | None = None) -> list[Sc
     return scenes
 
 
+def scene_of(name: str, data: Mapping[str, Any]) -> Scene:
+    """Scene of values that no file holds, such as those of one that was drawn.
+
+    Parameters
+    ----------
+    name : str
+        Of the captures, and in messages.
+    data : mapping
+        As a scene file has it, without ``vary``.
+
+    Raises
+    ------
+    ConfigError, PluginError
+        As :func:`read_scenes`.
+    """
+    source = YamlFile(name, dict(data), {})
+    return _scene(name, data, source, Path(), partial(read_robot, folder=Path(), place=source.place(("robot",))))
+
+
 def _scene(
     name: str, data: Mapping[str, Any], source: YamlFile, folder: Path, robot_named: Callable[[str], Robot]
 ) -> Scene:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import csv
+from collections.abc import Sequence
+from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -55,54 +57,39 @@ class Straight(Params):
 
     @model_validator(mode="after")
     def _halts_on_the_way(self) -> Straight:
-        length, reached = _length(self.start_m, self.end_m), 0.0
-        for number, halt in enumerate(self.halts):
-            if halt.at_m > length:
-                raise ValueError(f"halts[{number}].at_m: {halt.at_m:g} m lies behind the end of the way, {length:g} m")
-            if number and halt.at_m <= reached:
-                raise ValueError(
-                    f"halts[{number}].at_m: {halt.at_m:g} m must lie behind the halt before, {reached:g} m"
-                )
-            reached = halt.at_m
+        _check_halts(self.halts, _length(self.start_m, self.end_m))
         return self
 
     def sampled(self, rate_hz: float) -> Trajectory:
         """Pose at each frame."""
-        track = _along([self.start_m, self.end_m], self.speed_m_s, self.yaw_deg, rate_hz)
-        if not self.halts:
-            return track
-        at_m, halt_s = np.array([[halt.at_m, halt.seconds] for halt in self.halts]).T
-        left_s = at_m / self.speed_m_s + np.cumsum(halt_s)
-        length = _length(self.start_m, self.end_m)
-        knots_s = np.concatenate(
-            [[0.0], np.stack([left_s - halt_s, left_s], axis=1).ravel(), [length / self.speed_m_s + halt_s.sum()]]
-        )
-        times = _times(knots_s[-1], rate_hz)
-        gone = np.interp(times, knots_s, np.concatenate([[0.0], np.repeat(at_m, 2), [length]]))
-        start, end = in_space(self.start_m), in_space(self.end_m)
-        return _poses(times, start + gone[:, None] * (end - start) / max(length, 1e-9), float(track.yaw_rad[0]))
+        return _along([self.start_m, self.end_m], self.speed_m_s, self.yaw_deg, rate_hz, self.halts)
 
 
 class Waypoints(Params):
-    """Straight legs between points at constant speed; at each point the robot turns on the spot."""
+    """Straight legs between points at constant speed; at each point the robot turns on the spot.
+
+    It stands still where the scene names halts.
+    """
 
     kind: Literal["waypoints"]
     points_m: list[Point] = Field(min_length=2)
     speed_m_s: float = Field(0.3, gt=0)
     yaw_deg: float | None = Field(None, description="Heading; along each leg if left out.")
     turn_deg_s: float | None = Field(None, gt=0, description="How fast it turns; in an instant if left out.")
+    halts: list[Halt] = Field(default_factory=list, description="In the order of the way.")
 
     @model_validator(mode="after")
     def _turns(self) -> Waypoints:
         if self.turn_deg_s is not None and self.yaw_deg is not None:
             raise ValueError("a robot that keeps its heading (yaw_deg) does not turn: leave turn_deg_s out")
+        _check_halts(self.halts, float(np.sum([_length(*leg) for leg in pairwise(self.points_m)])))
         return self
 
     def sampled(self, rate_hz: float) -> Trajectory:
         """Pose at each frame."""
         if self.turn_deg_s is None:
-            return _along(self.points_m, self.speed_m_s, self.yaw_deg, rate_hz)
-        return _turning(self.points_m, self.speed_m_s, np.radians(self.turn_deg_s), rate_hz)
+            return _along(self.points_m, self.speed_m_s, self.yaw_deg, rate_hz, self.halts)
+        return _turning(self.points_m, self.speed_m_s, np.radians(self.turn_deg_s), rate_hz, self.halts)
 
 
 class Arc(Params):
@@ -217,12 +204,48 @@ def _poses(times: FloatArray, position_m: FloatArray, yaw_rad: FloatArray | floa
     return Trajectory(times, position_m, np.broadcast_to(np.asarray(yaw_rad, float), times.shape).copy())
 
 
-def _along(points: list[Point], speed_m_s: float, yaw_deg: float | None, rate_hz: float) -> Trajectory:
+def _check_halts(halts: Sequence[Halt], length_m: float) -> None:
+    """Refuse halts that are not in the order of the way, or behind its end."""
+    reached = 0.0
+    for number, halt in enumerate(halts):
+        if halt.at_m > length_m:
+            raise ValueError(f"halts[{number}].at_m: {halt.at_m:g} m lies behind the end of the way, {length_m:g} m")
+        if number and halt.at_m <= reached:
+            raise ValueError(f"halts[{number}].at_m: {halt.at_m:g} m must lie behind the halt before, {reached:g} m")
+        reached = halt.at_m
+
+
+def _going(duration_s: float, rate_hz: float, halts: Sequence[Halt], at_s: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Frame times, and how long the robot has been going until each, without its halts.
+
+    Parameters
+    ----------
+    duration_s : float
+        Of the way without halts.
+    rate_hz : float
+    halts : sequence of Halt
+    at_s : (halts,) array
+        How long the robot has been going when it halts.
+    """
+    if not halts:
+        times = _times(duration_s, rate_hz)
+        return times, times
+    halt_s = np.array([halt.seconds for halt in halts])
+    left_s = at_s + np.cumsum(halt_s)
+    times = _times(duration_s + halt_s.sum(), rate_hz)
+    knots_s = np.concatenate([[0.0], np.stack([left_s - halt_s, left_s], axis=1).ravel(), [duration_s + halt_s.sum()]])
+    return times, np.interp(times, knots_s, np.concatenate([[0.0], np.repeat(at_s, 2), [duration_s]]))
+
+
+def _along(
+    points: list[Point], speed_m_s: float, yaw_deg: float | None, rate_hz: float, halts: Sequence[Halt] = ()
+) -> Trajectory:
     knots = np.stack([in_space(point) for point in points])
     legs = np.diff(knots, axis=0)
     reached = np.concatenate([[0.0], np.cumsum(np.linalg.norm(legs, axis=1))])
-    times = _times(reached[-1] / speed_m_s, rate_hz)
-    gone = np.minimum(times * speed_m_s, reached[-1])
+    at_s = np.array([halt.at_m for halt in halts]) / speed_m_s
+    times, going_s = _going(reached[-1] / speed_m_s, rate_hz, halts, at_s)
+    gone = np.minimum(going_s * speed_m_s, reached[-1])
     position = np.stack([np.interp(gone, reached, knots[:, axis]) for axis in range(3)], axis=1)
     if yaw_deg is not None:
         return _poses(times, position, np.radians(yaw_deg))
@@ -230,7 +253,9 @@ def _along(points: list[Point], speed_m_s: float, yaw_deg: float | None, rate_hz
     return _poses(times, position, np.arctan2(legs[:, 1], legs[:, 0])[leg])
 
 
-def _turning(points: list[Point], speed_m_s: float, turn_rad_s: float, rate_hz: float) -> Trajectory:
+def _turning(
+    points: list[Point], speed_m_s: float, turn_rad_s: float, rate_hz: float, halts: Sequence[Halt]
+) -> Trajectory:
     """Legs between points, and turns on the spot by the shorter way from leg to leg."""
     stops = np.stack([in_space(point) for point in points])
     legs = np.diff(stops, axis=0)
@@ -240,10 +265,11 @@ def _turning(points: list[Point], speed_m_s: float, turn_rad_s: float, rate_hz: 
     passed_s = np.zeros(2 * len(legs) - 1)  # a leg, a turn, a leg ...
     passed_s[0::2], passed_s[1::2] = driven_s, turned_s
     reached_s = np.concatenate([[0.0], np.cumsum(passed_s)])
-    times = _times(reached_s[-1], rate_hz)
+    way_m = np.concatenate([[0.0], np.repeat(np.cumsum(driven_s * speed_m_s), 2)[:-1]])  # turning, it gains none
+    times, going_s = _going(reached_s[-1], rate_hz, halts, np.interp([halt.at_m for halt in halts], way_m, reached_s))
     place = np.concatenate([[0], np.repeat(np.arange(1, len(legs)), 2), [len(legs)]])
-    position = np.stack([np.interp(times, reached_s, stops[place, axis]) for axis in range(3)], axis=1)
-    return _poses(times, position, np.interp(times, reached_s, np.repeat(heading, 2)))
+    position = np.stack([np.interp(going_s, reached_s, stops[place, axis]) for axis in range(3)], axis=1)
+    return _poses(times, position, np.interp(going_s, reached_s, np.repeat(heading, 2)))
 
 
 def _read_poses(path: Path) -> dict[str, FloatArray]:

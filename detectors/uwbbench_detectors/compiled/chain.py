@@ -212,7 +212,7 @@ def _azimuth(chain: Chain, stage: Azimuth) -> bool:
     chain.limits[[at.SINE_DIVISOR, at.ANGLE_DIVISOR]] = divisors
     chain.limits[at.ANGLE_SIGN] = stage.params.sign
     bias = at.PDOA_BIAS if stage.params.bias_domain == "alpha" else at.ANGLE_BIAS
-    chain.limits[bias] = np.deg2rad(stage.params.bias_deg)
+    chain.limits[bias] = stage.bias_rad
     chain.columns.append("azimuth_rad")
     return True
 

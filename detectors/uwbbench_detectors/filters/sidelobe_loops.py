@@ -34,7 +34,7 @@ def side_lobe_db(off_taps: float, off_cosine: float, spread: float, at: FloatArr
     return in_range - 10 * math.log10(1 + ratio * ratio)
 
 
-@inlined
+@compiled
 def masked(
     taps: FloatArray, scores: FloatArray, cosines: FloatArray, spreads: FloatArray, row: int, count: int, at: FloatArray
 ) -> bool:

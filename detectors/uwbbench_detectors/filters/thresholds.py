@@ -8,7 +8,7 @@ from typing import ClassVar, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from uwbbench.api import Block, BoolArray, Filter, Limit, LimitFilter, Params, ports
+from uwbbench.api import Block, BoolArray, Filter, Limit, LimitFilter, Params, Radar, ports
 
 
 def _check_order(minimum: float | None, maximum: float | None, unit: str) -> None:
@@ -193,3 +193,39 @@ class AngleCostFilter(LimitFilter[AngleCostFilterParams]):
 
     consumes: ClassVar[frozenset[str]] = ports("detections", "angle_cost")
     limits: ClassVar[Mapping[str, Limit]] = {"maximum": Limit("angle_cost", "most")}
+
+
+class ReflectionFilterParams(Params):
+    """Weakest mirror."""
+
+    minimum_db: float = Field(
+        -16.0,
+        description="Amplitude relative to that of a perfect mirror. Plaster and wood reflect -8 to -15 dB, and what is "
+        "smaller than the first Fresnel zone less; isolation between the antennas adds to all amplitudes, 6 to 12 dB on "
+        "the robots that are known.",
+    )
+
+
+class ReflectionFilter(Filter[ReflectionFilterParams]):
+    """Keep what reflects well enough for an obstacle, whatever its range.
+
+    A perfect mirror at range r shows the transmitter's image at the distance 2 r, while the direct path has flown the
+    baseline D: in frames that are relative to the direct path its amplitude is ``D / (2 r)``, so that
+    ``20 log10(2 r A / D)`` is its reflection in decibels, plus the isolation between the antennas. Needs frames that
+    are scaled to the direct path, as by ``align.template``.
+
+    Where transmitter and receiver are in one place all detections pass, with a note.
+    """
+
+    consumes: ClassVar[frozenset[str]] = ports("detections", "amplitude", "range_m")
+
+    def open(self, radar: Radar) -> None:
+        """Look up the baseline."""
+        super().open(radar)
+        if radar.baseline_length_m == 0:
+            self.note("filter.reflection left out: transmitter and receiver are in one place, and no baseline scales it")
+        self.least = radar.baseline_length_m / 2 * 10 ** (self.params.minimum_db / 20)
+
+    def keep(self, block: Block) -> BoolArray:
+        """Mask of the detections that reflect well enough."""
+        return np.asarray(block.detections["amplitude"] * block.detections.range_m >= self.least)

@@ -10,9 +10,9 @@ import numpy as np
 from uwbbench.api import BoolArray, FloatArray, compiled, inlined
 from uwbbench_detectors.first_path.fractional import PAD, moved, power_between
 
-TO_TAP, CREST_START, CREST_STOP, LEAD, MEMORY, STEP_M, POWER_RATIO, LEADING = range(8)
+TO_TAP, CREST_START, CREST_STOP, LEAD, MEMORY, STEP_M, POWER_RATIO, LEADING, TRAIL = range(9)
 """Settings, by their places."""
-SETTINGS = 8
+SETTINGS = 9
 COUNT, PATH_M, X_M, Y_M = range(4)
 """State of a response between frames, by its places: looks that made the template, the path since the last one, and the
 robot's place."""
@@ -29,7 +29,7 @@ LEAST = 1e-36
 """Magnitude below which a single-precision frame is empty: its square and its reciprocal are no numbers any more."""
 
 
-@inlined
+@compiled
 def refined(padded: Any, tap: float, rounds: int, table: Any) -> float:
     """Crest near a tap, by parabolas through logarithms on steps of 1/2, 1/5 and 2/25 tap.
 
@@ -133,7 +133,7 @@ def stands_out(padded: Any, crest: int, at: FloatArray) -> bool:
     return height * (stop - start) >= power * at[POWER_RATIO]
 
 
-@inlined
+@compiled
 def align_response(
     samples: Any, template: Any, carried: FloatArray, at: FloatArray, table: Any, padded: Any, made: Any
 ) -> bool:
@@ -174,13 +174,13 @@ def align_response(
     settled = carried[COUNT] >= FIRST_LOOKS
     tap = refined(padded, float(crest), 1 if settled else 3, table)
     tap = max(min(tap, to_tap + REACH), to_tap - REACH)
-    start, stop = max(aim - int(at[LEAD]), 1), min(aim + 3, taps - 1)
+    start, stop = max(aim - int(at[LEAD]), 1), min(aim + int(at[TRAIL]) + 1, taps - 1)
     if settled:
         for _ in range(2):
             moved(padded, tap - to_tap, table, start, stop, made)
             shift, _, _ = fitted(made, template, start, stop)
             tap -= max(-LARGEST_STEP, min(LARGEST_STEP, shift))
-    moved(padded, tap - to_tap, table, 0, taps, made)
+    moved(padded, tap - to_tap, table, min(start, 0), taps, made)
     gain_r, gain_i = float(made[0, aim]), float(made[1, aim])
     if settled:
         gain_r = gain_i = size = 0.0

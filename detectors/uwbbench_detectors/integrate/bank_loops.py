@@ -80,7 +80,7 @@ def slid(sums: Any, by: int) -> None:
                 line[tap] = np.float32(0)
 
 
-@inlined
+@compiled
 def added(
     channels: Any, way_m: float, keep: float, cosines: FloatArray, sums: Any, come: FloatArray, at: FloatArray
 ) -> None:
@@ -126,7 +126,7 @@ def added(
                 sum_i[tap] = left * sum_i[tap] + (turn_r * im + turn_i * re)
 
 
-@inlined
+@compiled
 def powers(sums: Any, per_noise: Any, power: Any) -> None:
     """Power of each sum over that of its noise, added over the channels.
 
@@ -163,7 +163,7 @@ def highest_of(power: Any, tap: int) -> float:
     return float(max(power[tap - 1], power[tap], power[tap + 1]))
 
 
-@inlined
+@compiled
 def maxima(
     power: Any,
     sums: Any,
@@ -225,7 +225,7 @@ def maxima(
     return count
 
 
-@inlined
+@compiled
 def bank_frame(
     first: Any,
     second: Any,

@@ -11,6 +11,7 @@ map-building algorithm for real-time implementation, IEEE T-RA 17(3), 2001).
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -20,7 +21,7 @@ from uwbbench.api import LANDMARK_KINDS, FloatArray, IntArray, LandmarkKind, Lan
 from uwbbench_detectors.mappers.motion import HEAD, Motion, MotionParams
 from uwbbench_detectors.mappers.rest import Rest, places_of
 
-_POSE = np.arange(3)
+_laid = np.ascontiguousarray  # the inner loops are compiled for this layout alone
 
 
 class Model(Protocol):
@@ -78,10 +79,12 @@ class Ekf:
     """
 
     def __init__(self, pose: FloatArray, motion: MotionParams, near_m: float = 8.0, reach_m: float = 5.0) -> None:
+        from uwbbench_detectors.mappers import gaussian  # compiled
+
+        self._gaussian = gaussian
         self.motion = Motion(motion)
         self._mean = np.concatenate([np.asarray(pose, np.float64), [0.0, 0.0]])
         self._covariance = np.diag(self.motion.start_variance)
-        self._half = np.empty((0, 0))
         self._near: list[int] = []  # handles of the landmarks behind the head, in order
         self._starts: dict[int, int] = {}  # where each of them begins
         self._kinds: dict[LandmarkKind, tuple[list[int], IntArray]] = {}  # of those asked for since they changed
@@ -125,11 +128,9 @@ class Ekf:
     def predict(self, moved: FloatArray) -> None:
         """Move by a step (3,) of odometry, in the robot's frame before it."""
         self._mean[:3], by_head, noise = self.motion.predicted(self._mean[:HEAD], moved)
-        self._covariance[:3] = by_head @ self._covariance[:HEAD]
-        self._covariance[:, :3] = self._covariance[:, :HEAD] @ by_head.T
-        self._covariance[:3, :3] += noise
+        self._gaussian.move(self._covariance, by_head, noise)
         self._rest.predict(by_head)
-        if np.hypot(*(self._mean[:2] - self._center_m)) > self._leave_m:
+        if math.dist(self._mean[:2], self._center_m) > self._leave_m:
             self._move_on()
 
     def doubt(self, covariance: FloatArray) -> None:
@@ -179,13 +180,9 @@ class Ekf:
         marks = self._mean[starts[:, None] + np.arange(2)]
         expected, by_pose, by_mark = model.expected(self._mean[:3], marks)
         off = model.differences(measured, expected)
-        by_both = np.concatenate([by_pose, by_mark], axis=2)
-        rows = np.empty((len(starts), 5), np.int64)
-        rows[:, :3], rows[:, 3], rows[:, 4] = _POSE, starts, starts + 1
-        known = self._covariance[rows[:, :, None], rows[:, None, :]]
-        spread = by_both @ known @ by_both.swapaxes(1, 2) + noise
-        weighed = np.linalg.solve(spread, off[:, :, None])[:, :, 0]
-        return handles, np.asarray((weighed * off).sum(axis=1))
+        return handles, self._gaussian.squared_distances(
+            self._covariance, starts, _laid(by_pose), _laid(by_mark), _laid(off), _laid(noise)
+        )
 
     def update(
         self, model: Model, handle: int, measured: FloatArray, noise: FloatArray, *, trusted: bool = True
@@ -213,7 +210,7 @@ class Ekf:
         off = model.differences(measured, expected)[0]
         self._marks[handle].support += 1
         rows = np.array([0, 1, 2, start, start + 1])
-        learning = None if trusted else rows[3:]
+        learning = None if trusted else (start, start + 2)
         return self._correct(rows, np.concatenate([by_pose[0], by_mark[0]], axis=1), off, noise, learning)
 
     def add(self, model: Model, measured: FloatArray, noise: FloatArray, number: int | None = None) -> int:
@@ -258,7 +255,7 @@ class Ekf:
         start = self._at(handle)
         rows = [start, start + 1]
         self._mean = np.delete(self._mean, rows)
-        self._covariance = np.delete(np.delete(self._covariance, rows, axis=0), rows, axis=1)
+        self._covariance = np.ascontiguousarray(np.delete(np.delete(self._covariance, rows, axis=0), rows, axis=1))
         self._rest.remove(rows)
         self._set_near([other for other in self._near if other != handle])
 
@@ -337,12 +334,14 @@ class Ekf:
         return rows, difference, np.hstack([np.eye(2), -np.eye(2)])
 
     def _correct(
-        self, rows: IntArray, seen: FloatArray, off: FloatArray, noise: FloatArray, learning: IntArray | None = None
+        self,
+        rows: IntArray,
+        seen: FloatArray,
+        off: FloatArray,
+        noise: FloatArray,
+        learning: tuple[int, int] | None = None,
     ) -> float:
         """Update with what depends on a few values of the near state alone.
-
-        The covariance is that of Joseph's form, ``(I - K H) P (I - K H)' + K R K'``, multiplied out so that the zeros
-        of H cost nothing: symmetric whatever is rounded.
 
         Parameters
         ----------
@@ -354,30 +353,20 @@ class Ekf:
             Innovation.
         noise : (k, k) array
             Covariance R.
-        learning : (l,) int array, optional
-            Places of the near state that are corrected; everything if left out.
+        learning : int and int, optional
+            First place of the near state that is corrected, and the one behind the last; everything if left out.
 
         Returns
         -------
         float
             Squared Mahalanobis distance of the innovation.
         """
-        across = self._covariance[:, rows] @ seen.T
-        spread = seen @ across[rows] + noise
-        weight = np.asarray(np.linalg.inv(spread), np.float64)
-        gain = across @ weight
-        if learning is not None:
-            held = np.ones(len(gain), bool)
-            held[learning] = False
-            gain[held] = 0.0
-        self._mean += gain @ off
+        everything = 0, len(self._mean)
+        weight, gain = self._gaussian.correct(
+            self._mean, self._covariance, rows, _laid(seen), _laid(off), _laid(noise), learning or everything
+        )
         self._mean[2] = wrap_one_angle(self._mean[2])
-        if self._half.shape != self._covariance.shape:
-            self._half = np.empty(self._covariance.shape)  # asking for fresh memory takes longer than all the rest
-        np.dot(gain, across.T - spread / 2 @ gain.T, out=self._half)
-        self._covariance -= self._half
-        self._covariance -= self._half.T
-        self._rest.correct(seen, weight if learning is None else None, off, gain, rows)
+        self._rest.correct(seen, weight if learning is None else None, off, gain.T, rows)
         return float(off @ weight @ off)
 
     def _settle(self) -> None:
@@ -397,4 +386,5 @@ class Ekf:
         resting = [rest.handles[place] for place in np.flatnonzero(~chosen)]
         columns = places_of(rest.handles, self._near)
         rest.enter(columns, resting)
-        self._mean, self._covariance = rest.mean[columns], rest.covariance[np.ix_(columns, columns)]
+        self._mean = rest.mean[columns]
+        self._covariance = np.ascontiguousarray(rest.covariance[np.ix_(columns, columns)])

@@ -8,6 +8,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from uwbbench.api import Block, ConfigError, FloatArray, Params, Radar, Stage, ports
+from uwbbench_detectors.position.receivers import of_receiver
 
 PAPER_FACTOR = 0.95
 """Printed divisor of the angle, which equals twice the antenna spacing in wavelengths on channel 9."""
@@ -25,10 +26,10 @@ class AzimuthParams(Params):
     spacing_m: float | None = Field(
         None, gt=0, description="Antenna spacing s for 'physical'; null takes the radar's own."
     )
-    bias_deg: float = Field(
+    bias_deg: float | dict[str, float] = Field(
         0.0,
-        description="Calibration offset that is subtracted. The paper's are 0.0522 rad = 2.99 (channel 5) and 0.0209 "
-        "rad = 1.20 (channel 9).",
+        description="Calibration offset that is subtracted, one for all receivers or by their names. The paper's are "
+        "0.0522 rad = 2.99 (channel 5) and 0.0209 rad = 1.20 (channel 9).",
     )
     bias_domain: Literal["theta", "alpha"] = Field(
         "theta", description="Whether the offset belongs to the angle or to the phase difference."
@@ -63,7 +64,8 @@ class Azimuth(Stage[AzimuthParams]):
     Raises
     ------
     ConfigError
-        For ``formula: physical`` where neither ``spacing_m`` nor the radar gives the antenna spacing.
+        For ``formula: physical`` where neither ``spacing_m`` nor the radar gives the antenna spacing, or a receiver
+        that ``bias_deg`` does not name.
 
     References
     ----------
@@ -81,11 +83,13 @@ class Azimuth(Stage[AzimuthParams]):
             return {}
         if self.params.bias_domain != "theta":
             raise ConfigError("bias_domain: an offset of the azimuth can be set in the domain 'theta' alone")
-        return {"bias_deg": self.params.bias_deg + float(np.rad2deg(offset))}
+        bias_deg = of_receiver(self.params.bias_deg, getattr(self, "radar", None), "bias_deg")
+        return {"bias_deg": bias_deg + float(np.rad2deg(offset))}
 
     def open(self, radar: Radar) -> None:
-        """Find the antenna spacing where the formula asks for it."""
+        """Find the antenna spacing where the formula asks for it, and the receiver's offset."""
         super().open(radar)
+        self.bias_rad = float(np.deg2rad(of_receiver(self.params.bias_deg, radar, "azimuth: bias_deg")))
         if self.params.formula == "physical" and self._spacing_m is None:
             raise ConfigError(
                 f"azimuth: formula 'physical' needs the antenna spacing: receiver '{radar.receiver}' does not know its "
@@ -94,7 +98,7 @@ class Azimuth(Stage[AzimuthParams]):
 
     def step(self, block: Block) -> Block:
         """Block whose detections carry ``azimuth_rad``."""
-        bias_rad = np.deg2rad(self.params.bias_deg)
+        bias_rad = self.bias_rad
         in_alpha = self.params.bias_domain == "alpha"
         alpha = self.params.sign * block.detections["pdoa_rad"] - (bias_rad if in_alpha else 0.0)
         return block.with_columns(azimuth_rad=self._angle(alpha) - (0.0 if in_alpha else bias_rad))

@@ -7,7 +7,8 @@ from typing import ClassVar
 import numpy as np
 from pydantic import Field
 
-from uwbbench.api import Block, FloatArray, Params, Stage, ports
+from uwbbench.api import SPEED_OF_LIGHT_M_S, Block, FloatArray, Params, Radar, Stage, ports
+from uwbbench_detectors.integrate.motion import plain
 
 
 class MirrorRangeParams(Params):
@@ -48,37 +49,29 @@ class MirrorRange(Stage[MirrorRangeParams]):
         """A bias of ``offset`` metres more."""
         return {"bias_m": self.params.bias_m + offset} if column == "range_m" else {}
 
+    def open(self, radar: Radar) -> None:
+        """Work out the geometry of the antennas."""
+        super().open(radar)
+        from uwbbench_detectors.position import mirror_loops as loops
+
+        self._mirror_ranges = loops.mirror_ranges
+        from_transmission = radar.first_tap_delay_s is not None
+        settings = {
+            loops.WITHIN_RAD: np.deg2rad(self.params.boresight_within_deg),
+            loops.BASELINE_X: radar.baseline_m[0],
+            loops.BASELINE_Y: radar.baseline_m[1],
+            loops.BASELINE_M: radar.baseline_length_m,
+            loops.INTERVAL_S: radar.sample_interval_s,
+            loops.EXCESS_OFFSET_M: radar.baseline_length_m if from_transmission else 0.0,
+            loops.SPEED_M_S: SPEED_OF_LIGHT_M_S,
+            loops.BIAS_M: self.params.bias_m,
+        }
+        self.at: FloatArray = np.zeros(loops.SETTINGS)
+        self.at[list(settings)] = list(settings.values())
+
     def step(self, block: Block) -> Block:
         """Block whose detections carry ``delay_s`` and ``range_m``."""
-        radar, rows = self.radar, block.detections
-        delay_s = (rows["tap"] - block.part("first_path")[block.rows]) * radar.sample_interval_s
-        azimuth_rad = rows["middle_rad"] if "middle_rad" in rows.names else rows.azimuth_rad
-        range_m = mirror_range(
-            radar.excess_m(delay_s), azimuth_rad, radar.baseline_m, np.deg2rad(self.params.boresight_within_deg)
-        )
-        return block.with_columns(delay_s=delay_s, range_m=range_m - self.params.bias_m)
-
-
-def mirror_range(
-    excess_m: FloatArray, azimuth_rad: FloatArray, baseline_m: FloatArray, boresight_within_rad: float
-) -> FloatArray:
-    """Distance of mirrors from the receiver; NaN where the path is shorter than the baseline.
-
-    Parameters
-    ----------
-    excess_m : (n,) array
-        Path length minus the baseline.
-    azimuth_rad : (n,) array
-        Direction that they face, from boresight; NaN: along it.
-    baseline_m : (3,) array
-        From receiver to transmitter, in the receiver frame.
-    boresight_within_rad : float
-        Azimuths up to this count as 0.
-    """
-    faces_rad = np.where(np.abs(azimuth_rad) > boresight_within_rad, azimuth_rad, 0.0)
-    along_m = np.cos(faces_rad) * baseline_m[0] + np.sin(faces_rad) * baseline_m[1]
-    beyond = excess_m * (excess_m + 2 * float(np.linalg.norm(baseline_m)))
-    root = np.sqrt(np.maximum(along_m * along_m + beyond, 0.0))
-    # (a + sqrt(a^2 + b)) / 2 loses its digits where a < 0 and b is small.
-    half = np.where(along_m >= 0, along_m + root, beyond / np.where(along_m < 0, root - along_m, 1.0)) / 2
-    return np.asarray(np.where(excess_m >= 0, half, np.nan))
+        rows = block.detections
+        delay_s = (rows["tap"] - block.part("first_path")[block.rows]) * self.radar.sample_interval_s
+        azimuth_rad = plain(rows["middle_rad" if "middle_rad" in rows.names else "azimuth_rad"], np.float64)
+        return block.with_columns(delay_s=delay_s, range_m=self._mirror_ranges(plain(delay_s, np.float64), azimuth_rad, self.at))

@@ -40,10 +40,11 @@ class PdoaParams(Params):
     wrap: Literal["half_open", "closed_above"] = Field(
         "half_open", description="Interval of the result: [-pi, pi) or (-pi, pi]; they differ at pi alone."
     )
-    reference: Literal["none", "direct"] = Field(
+    reference: Literal["none", "direct", "aligned"] = Field(
         "none",
         description="'direct' takes the phase difference of the direct path off and adds what the geometry expects of "
-        "it, which cancels a carrier offset between the STS halves and cable phases.",
+        "it, which cancels a carrier offset between the STS halves and cable phases; 'aligned' adds alone, where "
+        "'align.template' has taken it off already.",
     )
 
 
@@ -55,12 +56,14 @@ class Pdoa(Stage[PdoaParams]):
 
     With ``reference: direct`` the difference becomes ``alpha - alpha_direct + 2 pi s / lambda sin(theta_TX)``: the
     direct path is read at the block's first path by the same sampling rule, ``s`` is the antenna spacing, and
-    ``sin(theta_TX)`` the lateral part of the unit vector from receiver to transmitter.
+    ``sin(theta_TX)`` the lateral part of the unit vector from receiver to transmitter. With ``reference: aligned``
+    responses are relative to their direct paths, which may be gone, and the last term alone is added.
 
     Raises
     ------
     ConfigError
-        For ``reference: direct``, if the radar has no antenna spacing, or its transmitter stands at the receiver and
+        For a reference other than ``none``, if the radar has no antenna spacing, or its transmitter stands at the
+        receiver and
         the direct path has no direction.
 
     References
@@ -77,14 +80,15 @@ class Pdoa(Stage[PdoaParams]):
     def open(self, radar: Radar) -> None:
         """Work out the phase difference that the direct path should have."""
         super().open(radar)
-        self._expected_rad = _direct_path_pdoa(radar) if self.params.reference == "direct" else 0.0
+        self._expected_rad = 0.0 if self.params.reference == "none" else _direct_path_pdoa(radar, self.params.reference)
 
     def step(self, block: Block) -> Block:
         """Block whose detections carry ``pdoa_rad``."""
         rows = block.rows
         alpha = self._difference(block.frames, rows, block.detections["tap"])
         if self.params.reference == "direct":
-            alpha = alpha - self._difference(block.frames, rows, block.part("first_path")[rows]) + self._expected_rad
+            alpha = alpha - self._difference(block.frames, rows, block.part("first_path")[rows])
+        alpha = alpha + self._expected_rad
         wrapped = wrap_angle(alpha) if self.params.wrap == "half_open" else -wrap_angle(-alpha)
         return block.with_columns(pdoa_rad=wrapped)
 
@@ -132,16 +136,16 @@ class Pdoa(Stage[PdoaParams]):
         return np.where(samples == 0, np.nan, np.angle(samples))
 
 
-def _direct_path_pdoa(radar: Radar) -> float:
+def _direct_path_pdoa(radar: Radar, reference: str) -> float:
     """Phase difference of a plane wave from the transmitter, ``2 pi s / lambda sin(theta_TX)``."""
     if radar.array_spacing_m is None:
         raise ConfigError(
-            f"pdoa: reference 'direct' needs the antenna spacing, which receiver '{radar.receiver}' lacks"
+            f"pdoa: reference '{reference}' needs the antenna spacing, which receiver '{radar.receiver}' lacks"
         )
     distance_m = radar.baseline_length_m
     if distance_m == 0:
         raise ConfigError(
-            f"pdoa: reference 'direct' needs a transmitter apart from receiver '{radar.receiver}': without a baseline "
-            "the direct path has no direction"
+            f"pdoa: reference '{reference}' needs a transmitter apart from receiver '{radar.receiver}': without a "
+            "baseline the direct path has no direction"
         )
     return float(2 * np.pi * radar.array_spacing_m / radar.wavelength_m * radar.baseline_m[1] / distance_m)

@@ -22,6 +22,7 @@ from uwbbench.api import (
     receiver_pose,
     to_world,
 )
+from uwbbench_detectors.position.receivers import of_receiver
 
 PAPER_BIAS_M = {5: 0.15, 9: 0.13}
 """Distance offsets of arXiv 2512.01018 by channel."""
@@ -42,10 +43,10 @@ class RangeParams(Params):
         description="Path d = c tau + D: the direct path that delays count from has flown the baseline D already. "
         "false takes d = c tau, which shortens ranges by about D/2.",
     )
-    bias_m: float | Literal["paper"] = Field(
+    bias_m: float | Literal["paper"] | dict[str, float] = Field(
         0.0,
-        description="Calibration offset that is subtracted; 'paper' is 0.15 on channel 5 and 0.13 on channel 9 (table "
-        "of key parameters of arXiv 2512.01018).",
+        description="Calibration offset that is subtracted, one for all receivers or by their names; 'paper' is 0.15 "
+        "on channel 5 and 0.13 on channel 9 (table of key parameters of arXiv 2512.01018).",
     )
     speed_of_light: Literal["exact", "rounded"] = Field(
         "exact",
@@ -69,7 +70,7 @@ class Range(Stage[RangeParams]):
     Raises
     ------
     ConfigError
-        For ``bias_m: paper`` on a capture of neither channel 5 nor 9.
+        For ``bias_m: paper`` on a capture of neither channel 5 nor 9, or a receiver that ``bias_m`` does not name.
 
     References
     ----------
@@ -94,7 +95,7 @@ class Range(Stage[RangeParams]):
                     "give a number in metres"
                 )
             bias = PAPER_BIAS_M[radar.channel]
-        self.bias_m = bias
+        self.bias_m = of_receiver(bias, radar, "range: bias_m")
 
     @property
     def speed_ratio(self) -> float:
@@ -114,7 +115,8 @@ class Range(Stage[RangeParams]):
             raise ConfigError(
                 f"bias_m: a measured offset can be added to a number, not to the preset '{self.params.bias_m}'"
             )
-        return {"bias_m": self.params.bias_m + offset}
+        bias_m = of_receiver(self.params.bias_m, getattr(self, "radar", None), "bias_m")
+        return {"bias_m": bias_m + offset}
 
     def step(self, block: Block) -> Block:
         """Block whose detections carry ``delay_s`` and ``range_m``, those of segments the ranges of their ends."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from operator import itemgetter
 from typing import ClassVar, Literal
 
 import numpy as np
@@ -121,38 +122,43 @@ class KalmanTrack(Stage[KalmanTrackParams]):
         }
         self._settings = np.zeros(state.SETTINGS)
         self._settings[list(settings)] = list(settings.values())
-        self._azimuth, self._numbered = state.AZIMUTH, state.NEXT
+        self._azimuth, self._counted, self._numbered = state.AZIMUTH, state.COUNT, state.NEXT
+        self._moves = p.odometry
         self._seen = False
-        self._given: tuple[str, ...] = ()
+        self._given: frozenset[str] = frozenset()
 
     def step(self, block: Block) -> Block:
         """Block whose detections are tracks."""
         frames, rows = block.frames, block.detections
-        self._seen |= len(frames) > 0
-        columns = rows.columns
-        if tuple(columns) != self._given:
+        columns, count = rows.columns, len(frames.timestamp_s)
+        if columns.keys() != self._given:
             self._look_at(rows)
+        self._seen |= count > 0
         place_m, yaw_rad = frames.odometry_position_m, frames.odometry_yaw_rad
-        if not self.params.odometry or place_m is None or yaw_rad is None:
-            clock = np.empty((len(frames), 2))
+        if not self._moves or place_m is None or yaw_rad is None:
+            clock = np.empty((2, count))
         else:
-            clock = np.empty((len(frames), 5))
-            clock[:, 2:4] = place_m[:, :2]
-            clock[:, 4] = yaw_rad
-        clock[:, 0] = frames.timestamp_s
-        clock[:, 1] = frames.valid
-        if len(frames) > 1 or not len(rows):  # in a single frame with a detection somebody has looked
+            clock = np.empty((5, count))
+            clock[2:4] = place_m[:, :2].T
+            clock[4] = yaw_rad
+        if count == 1:  # what a stream brings: numbers are set faster than rows of one number
+            clock[0, 0], clock[1, 0] = frames.timestamp_s.item(), frames.valid.item()
+        else:
+            clock[0], clock[1] = frames.timestamp_s, frames.valid
+        found = np.array(self._taken(columns))
+        if count > 1 or not found.size:  # in a single frame with a detection somebody has looked
             looked = np.asarray(frames.preamble.any(axis=1))
             looked[block.rows] = True
-            clock[:, 1] *= looked
-        found = np.empty((len(rows), len(self._read)))
-        for place, name in self._read:
-            found[:, place] = columns[name]
-        if len(frames) > 1:
-            found = found[np.argsort(found[:, 0], kind="stable")]
-        self._tracks, table = self._follow(self._tracks, self._carried, clock, found, self._settings, frames.first)
-        tracks = Detections.of_table(self._names, table, (frames.first, frames.valid), rows.notes)
-        return block.replace(detections=tracks)
+            clock[1] *= looked
+        if count > 1:
+            found = found.take(np.argsort(found[0], kind="stable"), axis=1)
+        room = int(self._carried.item(self._counted)) + found.shape[1]
+        if room > len(self._tracks):  # each detection may begin a track
+            self._tracks = np.concatenate([self._tracks, np.zeros((room, self._tracks.shape[1]))])
+        table = self._follow(self._tracks, self._carried, clock, found, self._settings, frames.first)
+        return block.replace(
+            detections=Detections.of_table(self._names, table, (frames.first, frames.valid), rows.notes)
+        )
 
     def flush(self) -> None:
         """Say so if nothing was tracked."""
@@ -165,9 +171,9 @@ class KalmanTrack(Stage[KalmanTrackParams]):
 
     def _look_at(self, rows: Detections) -> None:
         """Settle which columns tracks take over."""
-        self._given = rows.names
+        self._given = frozenset(rows.names)
         taken = ("amplitude", *(name for name in ("score_db", "azimuth_rad") if name in rows.names))
         read = ("frame", "range_m", *taken)
-        self._read = tuple(enumerate(read))
+        self._taken = itemgetter(*read)
         self._names = ("track", "range_m", "range_rate_m_s", "range_sd_m", *taken)
         self._settings[self._azimuth] = read.index("azimuth_rad") if "azimuth_rad" in taken else -1

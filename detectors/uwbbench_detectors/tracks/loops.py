@@ -77,14 +77,14 @@ def _associate(tracks: FloatArray, start: int, stop: int, here: FloatArray, used
         ``ROW`` is written.
     start, stop : int
         Places of the group in the table.
-    here : (rows, columns) array
+    here : (columns, rows) array
         Detections of the frame.
     used : (rows,) bool array
         Written.
     at : (SETTINGS,) array
     """
-    free, count = np.empty(len(here), np.int64), 0
-    for row in range(len(here)):
+    free, count = np.empty(len(used), np.int64), 0
+    for row in range(len(used)):
         if not used[row]:
             free[count] = row
             count += 1
@@ -94,7 +94,7 @@ def _associate(tracks: FloatArray, start: int, stop: int, here: FloatArray, used
     for place in range(stop - start):
         track = tracks[start + place]
         for column in range(count):
-            off_m = here[free[column], 1] - track[RANGE]
+            off_m = here[1, free[column]] - track[RANGE]
             cost[place, column] = min(off_m * off_m / (track[RANGE_VARIANCE] + at[VARIANCE]), at[GATE])
     column_of = assigned(cost)
     for place in range(stop - start):
@@ -163,7 +163,7 @@ def _first(here: FloatArray, rows: FloatArray, nearest: bool) -> int:
 
     Parameters
     ----------
-    here : (n, columns) array
+    here : (columns, n) array
         Detections of the frame.
     rows : (m,) array
     nearest : bool
@@ -173,7 +173,7 @@ def _first(here: FloatArray, rows: FloatArray, nearest: bool) -> int:
     for place in range(len(rows)):
         row = int(rows[place])
         if row >= 0:
-            height = -here[row, 1] if nearest else here[row, 2]
+            height = -here[1, row] if nearest else here[2, row]
             if first < 0 or height > best or (math.isnan(best) and not math.isnan(height)):
                 first, best = place, height
     return first
@@ -189,7 +189,7 @@ def _confirm(tracks: FloatArray, carried: FloatArray, here: FloatArray, at: Floa
     ----------
     tracks, carried : arrays
         Changed.
-    here : (rows, columns) array
+    here : (columns, rows) array
         Detections of the frame.
     at : (SETTINGS,) array
     """
@@ -220,39 +220,31 @@ def _confirm(tracks: FloatArray, carried: FloatArray, here: FloatArray, at: Floa
 
 
 @compiled
-def _start(tracks: FloatArray, carried: FloatArray, here: FloatArray, used: BoolArray, at: FloatArray) -> FloatArray:
+def _start(tracks: FloatArray, carried: FloatArray, here: FloatArray, used: BoolArray, at: FloatArray) -> None:
     """Begin tentative tracks from the detections that no track took, or from the first of them.
 
     Parameters
     ----------
     tracks, carried : arrays
         Changed.
-    here : (rows, columns) array
+    here : (columns, rows) array
         Detections of the frame.
     used : (rows,) bool array
     at : (SETTINGS,) array
-
-    Returns
-    -------
-    (room, fields) array
-        The table, a larger one where it had no room.
     """
     chosen = -1
     if at[ONE] > 0:
-        rows = np.empty(len(here))
-        for row in range(len(here)):
+        rows = np.empty(len(used))
+        for row in range(len(used)):
             rows[row] = -1 if used[row] else row
         chosen = _first(here, rows, at[NEAREST] > 0)
         if chosen < 0:
-            return tracks
-    for row in range(len(here)):
+            return
+    for row in range(len(used)):
         if not used[row] and (chosen < 0 or row == chosen):
             count = int(carried[COUNT])
-            if count == len(tracks):
-                tracks = _with_room(tracks, count)
-            _begin(tracks[count], here[row], row, carried, at)
+            _begin(tracks[count], here[:, row], row, carried, at)
             carried[COUNT] += 1
-    return tracks
 
 
 @compiled
@@ -264,7 +256,7 @@ def _write(
     Parameters
     ----------
     tracks, carried : arrays
-    here : (rows, columns) array
+    here : (columns, rows) array
         Detections of the frame.
     at : (SETTINGS,) array
     frame : int
@@ -286,8 +278,8 @@ def _write(
         whole[row, 0], whole[row, 1] = frame, int(track[NUMBER])
         table[row, 2], table[row, 3] = track[RANGE], track[RATE] - closing_m_s
         table[row, 4] = math.sqrt(track[RANGE_VARIANCE])
-        for column in range(2, here.shape[1]):
-            table[row, SHARED + column - 2] = here[int(track[ROW]), column] if track[ROW] >= 0 else np.nan
+        for column in range(2, len(here)):
+            table[row, SHARED + column - 2] = here[column, int(track[ROW])] if track[ROW] >= 0 else np.nan
         row += 1
     return row
 
@@ -295,18 +287,18 @@ def _write(
 @compiled
 def follow(
     tracks: FloatArray, carried: FloatArray, clock: FloatArray, found: FloatArray, at: FloatArray, first: int
-) -> tuple[FloatArray, FloatArray]:
+) -> FloatArray:
     """Take all tracks through the frames of a block.
 
     Parameters
     ----------
     tracks : (room, fields) array
-        Table of tracks; changed.
+        Table of tracks, with room for one more of each detection; changed.
     carried : (CARRIED,) array
         State of the stream besides; changed.
-    clock : (frames, 2) or (frames, 5) array
+    clock : (2, frames) or (5, frames) array
         Time, 1 for valid frames, and, where odometry is used, the robot's x, y and yaw.
-    found : (rows, columns) array
+    found : (columns, rows) array
         Index of the frame, range, amplitude and what else tracks take over of each detection, by frame.
     at : (SETTINGS,) array
     first : int
@@ -314,24 +306,22 @@ def follow(
 
     Returns
     -------
-    tracks : (room, fields) array
-        The table, a larger one where it had no room.
-    table : (n, SHARED + columns - 2) array
+    (n, SHARED + columns - 2) array
         Tracks in each frame: frame and number by their bits, range, its rate, its standard deviation, and what they
         take over, NaN where no detection belongs to the track.
     """
     none = 0 * len(clock)  # what is called with a plain 0 is compiled for it alone
-    table, written, start = np.empty((len(clock) + 1, SHARED + found.shape[1] - 2)), none, none
-    for frame in range(len(clock)):
+    table, written, start = np.empty((clock.shape[1] + 1, SHARED + len(found) - 2)), none, none
+    for frame in range(clock.shape[1]):
         stop = start
-        while stop < len(found) and found[stop, 0] <= first + frame:
+        while stop < found.shape[1] and found[0, stop] <= first + frame:
             stop += 1
-        here = found[start:stop]
+        here = found[:, start:stop]
         start = stop
-        if clock[frame, 1] == 0:
+        if clock[1, frame] == 0:
             continue  # nobody has looked: neither found nor missed
-        step_s, moved_x_m, moved_y_m = advance(carried, clock[frame], at)
-        _forget(tracks, carried, clock[frame, 0] - at[LIVES_S] - CLOCK_S, at)
+        step_s, moved_x_m, moved_y_m = advance(carried, clock[:, frame], at)
+        _forget(tracks, carried, clock[0, frame] - at[LIVES_S] - CLOCK_S, at)
         for place in range(int(carried[COUNT])):
             track = tracks[place]
             closed_m = moved_x_m * math.cos(track[BEARING]) + moved_y_m * math.sin(track[BEARING])
@@ -339,22 +329,22 @@ def follow(
             track[FRAMES] += 1
             track[ROW] = -1
 
-        used = np.empty(len(here), np.bool_)
-        for row in range(len(here)):
-            used[row] = not math.isfinite(here[row, 1])
+        used = np.empty(here.shape[1], np.bool_)
+        for row in range(len(used)):
+            used[row] = not math.isfinite(here[1, row])
         confirmed, count = int(carried[CONFIRMED]), int(carried[COUNT])
         _associate(tracks, none, confirmed, here, used, at)
         _associate(tracks, confirmed, count, here, used, at)
         for place in range(count):
             row = int(tracks[place, ROW])
             if row >= 0:
-                update(tracks[place], here[row, 1], at[VARIANCE])
-                _hit(tracks[place], here[row], row, carried, at)
+                update(tracks[place], here[1, row], at[VARIANCE])
+                _hit(tracks[place], here[:, row], row, carried, at)
         if at[ONE] == 0 or confirmed == 0:
-            tracks = _start(tracks, carried, here, used, at)
+            _start(tracks, carried, here, used, at)
             _confirm(tracks, carried, here, at)
 
         while written + carried[COUNT] > len(table):
             table = _with_room(table, written)
         written = _write(tracks, carried, here, at, first + frame, table, written)
-    return tracks, table[:written]
+    return table[:written]

@@ -285,6 +285,19 @@ class EchoOfNan(Stage[Params]):
         self.total = total[-1] if len(total) else self.total
         ones = np.ones(len(total))
         return block.replace(detections=Detections(block.frames.index, tap=ones, amplitude=total, range_m=total))
+
+
+class PlainSoftmax(Stage[Params]):
+    """A row for every frame, with a softmax whose exponentials overflow."""
+
+    consumes = ports("frames", "first_path")
+    produces = ports("detections", "probability")
+
+    def step(self, block):
+        with np.errstate(all="ignore"):
+            there = np.exp(np.abs(block.frames.preamble[:, 10:]).max(axis=1).astype(np.float32))
+            found = there / (1 + there)
+        return block.replace(detections=Detections(block.frames.index, probability=found))
 '''
 
 
@@ -304,6 +317,7 @@ def faulty(install_plugin) -> None:
                 "clutter.svd.gram": "uwbbench_faulty:GramClutter",
                 "dbscan.plane": "uwbbench_faulty:Plane",
                 "echo.of_nan": "uwbbench_faulty:EchoOfNan",
+                "classify.plain": "uwbbench_faulty:PlainSoftmax",
             }
         },
         {"uwbbench_faulty.py": FAULTY},

@@ -41,8 +41,8 @@ def test_a_detector_of_rarer_stages_stands_every_case(rare_detectors, name):
 @pytest.fixture(scope="module")
 def subjects():
     """Shipped detectors of all kinds."""
-    names = ("paper", "cfar-ca", "background-svd", "background-mean", "paper-subsample", "background-ema", "entropy")
-    return [Subject(load_detector(name)) for name in names]
+    names = ["paper", "paper-subsample", "cfar-ca", "background-svd", "background-mean", "background-ema", "entropy"]
+    return [Subject(load_detector(name)) for name in [*names, "coupling-logistic"]]
 
 
 @pytest.mark.parametrize("case", all_cases(), ids=lambda case: case.name)
@@ -114,6 +114,8 @@ def test_cases_have_names_of_their_own_and_say_what_they_expect():
         ),
         ("zero-frames", "hold no echo", ["{use: echo.of_nan}"]),
         ("constant-capture", "where nothing is", ["{use: echo.of_nan}"]),
+        ("frames-unlike-any-of-training", "'probability' of nan", [PATH, "{use: classify.plain}"]),
+        ("frames-without-a-direct-path-to-count-from", "3 rows", [PATH, "{use: classify.plain}"]),
     ],
     ids=lambda value: value if isinstance(value, str) else "",
 )

@@ -26,6 +26,7 @@ from uwbbench.measure.accuracy.metrics.error import (
     MeanAbsoluteError,
     Percentile90,
     Percentile95,
+    Scatter,
     StandardDeviation,
     matched_only,
 )
@@ -63,10 +64,10 @@ class ScoreBlock:
     mae_m, p90_m, p95_m, sd_m : float
         Of the absolute errors of all retained detections (:mod:`uwbbench.measure.accuracy.metrics.error`).
     tp, fp, fn, retained : int
-    matched_mae_m, matched_p90_m : float
+    matched_mae_m, matched_p90_m, matched_bias_m, matched_scatter_m : float
         Of true positives only; the recall beside them is the match rate.
-    bias_m : float
-        Mean signed error of all retained detections.
+    bias_m, scatter_m : float
+        Mean of the signed errors of all retained detections, and their spread around it.
     true_empty : int
         Frames with nothing to find and nothing found; not part of any ratio.
     duplicates, structure, unmatched : int
@@ -102,7 +103,10 @@ class ScoreBlock:
     retained: int
     matched_mae_m: float
     matched_p90_m: float
+    matched_bias_m: float
+    matched_scatter_m: float
     bias_m: float
+    scatter_m: float
     true_empty: int
     duplicates: int
     structure: int
@@ -295,7 +299,10 @@ def _block(detections: Detections, scene: Scene, rules: ScoringRules, table: Tab
         retained=len(verdict.outcome.error_m),
         matched_mae_m=evaluate(MeanAbsoluteError, matched),
         matched_p90_m=evaluate(Percentile90, matched),
+        matched_bias_m=evaluate(Bias, matched),
+        matched_scatter_m=evaluate(Scatter, matched),
         bias_m=evaluate(Bias, judged),
+        scatter_m=evaluate(Scatter, judged),
         true_empty=verdict.true_empty,
         duplicates=verdict.duplicates,
         structure=verdict.structure,

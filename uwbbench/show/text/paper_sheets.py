@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 _UNKNOWN = "not known"
 _COMPARED = ("precision", "recall", "mae")
 """Metrics of the small table; the others stand in the large ones."""
+_PRINTED = frozenset(name for cells in published.FIGURES.values() for name in cells)
+"""Metrics of the paper's own tables, which stand beside what is printed there however narrow a table should be."""
 
 
 def published_sheets(report: Report) -> Iterator[Sheet]:
@@ -92,7 +94,11 @@ def _alike(report: Report) -> Iterator[tuple[str, dict[str, Quantity], list[dict
     """Rows of each table whose scorings have the same metrics, with these."""
     groups: dict[tuple[str, tuple[str, ...]], list[dict[str, Any]]] = {}
     for row in report.paper_tables.to_dict("records"):
-        names = tuple(report.metrics.of(row["scoring"]).brief)
+        chosen = report.metrics.of(row["scoring"])
+        beside = _PRINTED if report.repeats_the_paper and row["scoring"] == published.SCORING else frozenset()
+        names = tuple(
+            dict.fromkeys([*(name for name in chosen if name in beside or name in chosen.brief), *chosen.brief])
+        )
         groups.setdefault((row["table"], names), []).append(row)  # type: ignore[arg-type]
     for (kind, names), rows in groups.items():
         yield kind, Quantity.of_all({name: report.metrics[name] for name in names}), rows

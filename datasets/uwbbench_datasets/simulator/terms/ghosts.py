@@ -10,7 +10,6 @@ from pydantic import Field
 
 from uwbbench.api import (
     SPEED_OF_LIGHT_M_S,
-    BoolArray,
     ComplexArray,
     FloatArray,
     Params,
@@ -29,7 +28,7 @@ from uwbbench_datasets.simulator.terms.echo import (
     PointParams,
     reflected,
 )
-from uwbbench_datasets.simulator.terms.walls import mirrored, walls
+from uwbbench_datasets.simulator.terms.walls import mirrored, reflection_point, walls
 
 _ECHOES = (
     PlateEcho(PlateParams.model_validate({})),
@@ -94,6 +93,7 @@ class WallGhostParams(Params):
     """How much weaker ghosts are."""
 
     loss_db: float = Field(0.0, ge=0, description="Beyond the wall's own reflection: 8 dB of concrete, 12 of plaster.")
+    twice: bool = Field(False, description="Also those that go out and back by way of the wall.")
 
 
 class WallGhost(Term[WallGhostParams]):
@@ -102,20 +102,22 @@ class WallGhost(Term[WallGhostParams]):
     The mirror image of the receiver (or transmitter) in the wall gives the length of the way; the ghost shows in the
     direction of the wall's reflection (or of the target). Its strength is that of the target's own echo, spread over
     the longer way, times the wall's reflection. It is there while target and radar stand on one side of the wall and
-    the reflection falls on it.
+    the reflection falls on it. Where the scene asks for it, a third ghost goes out and back by way of the wall: the
+    target's mirror image, weakened by two reflections.
     """
 
     def bound(self, view: View) -> float:
         """All ghosts of a frame in phase, with no spreading over the longer way; a wall shows one side at a time."""
-        walls_sum = sum(abs(self._reflected(view, wall)) for _, wall in walls(view))
+        strengths = [abs(self._reflected(view, wall)) for _, wall in walls(view)]
+        walls_sum = sum(2 * one + (one**2 if self.params.twice else 0.0) for one in strengths)
         targets_sum = sum(target.bound() for target in _targets(view)) if walls_sum else 0.0
-        return 2 * walls_sum * targets_sum * _largest_gain(view)
+        return walls_sum * targets_sum * _largest_gain(view)
 
     def _reflected(self, view: View, wall: SceneObject) -> complex:
         return reflected(wall, view.radar.center_frequency_hz) * 10 ** (-self.params.loss_db / 20)
 
     def paths(self, view: View, rng: np.random.Generator) -> Paths | None:
-        """Two paths for each target and side of a wall."""
+        """Two or three paths for each target and side of a wall."""
         sides = [(face, self._reflected(view, wall)) for wall, face in _wall_faces(view)]
         lengths, strengths, azimuths = [], [], []
         for target in _targets(view) if sides else ():
@@ -130,10 +132,16 @@ class WallGhost(Term[WallGhostParams]):
                 )
                 for by_wall, straight, azimuth in ways:
                     length = _distance(straight, point) + _distance(image, by_wall)
-                    shown = _reflects(face, point, by_wall)
+                    _, shown = reflection_point(face, point, by_wall)
                     lengths.append(length)
                     strengths.append(shown * strength * echo * direct / np.maximum(length, 1e-9))
                     azimuths.append(azimuth)
+                if self.params.twice:
+                    length = _distance(view.transmitter_m, image) + _distance(image, view.receiver_m)
+                    shown = np.logical_and(*(reflection_point(face, point, by_wall)[1] for by_wall, _, _ in ways))
+                    lengths.append(length)
+                    strengths.append(shown * strength**2 * echo * direct / np.maximum(length, 1e-9))
+                    azimuths.append(ways[0][2])
         return _paths(view, lengths, strengths, azimuths) if lengths else None
 
 
@@ -167,16 +175,6 @@ class RobotGhost(Term[RobotGhostParams]):
             strengths.append(self._scale(view) * target.amplitude(rng) ** 2)
             azimuths.append(view.azimuth_rad(point[:, None])[:, 0])
         return _paths(view, lengths, strengths, azimuths) if lengths else None
-
-
-def _reflects(face: Face, point_m: FloatArray, antenna_m: FloatArray) -> BoolArray:
-    """Whether the mirror reflection between target points and antennas (frames, 3) falls on the face."""
-    target, antenna = (point_m - face.center_m) @ face.normal, (antenna_m - face.center_m) @ face.normal
-    front = (target > 0) & (antenna > 0)
-    share = np.where(front, target, 1.0) / np.where(front, target + antenna, 2.0)
-    hit = point_m + share[:, None] * (antenna_m - point_m) - face.center_m
-    inside = (np.abs(hit @ face.across) <= face.width_m / 2) & (np.abs(hit[:, 2]) <= face.height_m / 2)
-    return np.asarray(front & inside)
 
 
 def _paths(

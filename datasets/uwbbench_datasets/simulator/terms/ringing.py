@@ -28,6 +28,9 @@ class RingingParams(Params):
     returns: int = Field(12, ge=1, le=1000, description="Number of returns.")
     drift: float = Field(0.015, ge=0, le=1, description="Relative amplitude of a slow drift; 0 for none.")
     drift_period_s: float = Field(60.0, gt=0, description="Period of the drift.")
+    spread_deg: float = Field(
+        0.0, ge=0, le=180, description="Returns come from up to this to either side; 0: alike to both antennas."
+    )
     taps: list[RingingTap] | None = Field(
         None, min_length=1, description="The returns themselves, in place of a profile that they are drawn from."
     )
@@ -43,7 +46,8 @@ class RingingParams(Params):
 class Ringing(Term[RingingParams]):
     """Robot-fixed ringing: a decaying row of returns that drifts a little.
 
-    As it stays the same from frame to frame, a recorded background can remove it. It reaches both antennas alike. The
+    As it stays the same from frame to frame, a recorded background can remove it. It reaches both antennas alike,
+    unless its directions are spread: then its sum at each, and with it the crest of the direct path, differs. The
     returns are drawn once a run, or once for the robot where the scene names one; ``taps`` states them instead.
     """
 
@@ -53,6 +57,7 @@ class Ringing(Term[RingingParams]):
     _level: FloatArray
     _strength: ComplexArray
     _turn: FloatArray
+    _azimuth_rad: FloatArray
 
     def prepare(self, view: View, rng: np.random.Generator) -> View:
         """Draw the returns, or take those that are known."""
@@ -68,6 +73,8 @@ class Ringing(Term[RingingParams]):
             self._level = np.asarray(np.sqrt(power), float)
             self._strength = (rng.normal(size=p.returns) + 1j * rng.normal(size=p.returns)) / np.sqrt(2)
         self._turn = rng.uniform(0, 2 * np.pi, len(self._delay_s))
+        side = rng.uniform(-1, 1, len(self._delay_s)) if p.spread_deg else np.zeros(len(self._delay_s))
+        self._azimuth_rad = np.radians(p.spread_deg) * side
         return view
 
     def _amplitude(self, view: View) -> ComplexArray:
@@ -81,4 +88,4 @@ class Ringing(Term[RingingParams]):
         """One path for each return."""
         turn = 2 * np.pi * view.timestamp_s[:, None] / self.params.drift_period_s + self._turn
         amplitude = self._amplitude(view) * (1 + self.params.drift * np.sin(turn))
-        return Paths(self._delay_s[None], amplitude, np.zeros((1, len(self._delay_s))))
+        return Paths(self._delay_s[None], amplitude, self._azimuth_rad[None])

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 from pydantic import Field
 
-from uwbbench.api import ComplexArray, FloatArray, Params, Paths, SceneObject, Term, View
+from uwbbench.api import BoolArray, ComplexArray, FloatArray, Params, Paths, SceneObject, Term, View
 from uwbbench_datasets.simulator.shapes import Face, faces
 from uwbbench_datasets.simulator.terms.echo import face_echo, reflected
 
@@ -21,6 +21,32 @@ def walls(view: View) -> Iterator[tuple[int, SceneObject]]:
 def mirrored(points_m: FloatArray, face: Face) -> FloatArray:
     """Points (..., 3) on the other side of a face's plane."""
     return np.asarray(points_m - 2 * ((points_m - face.center_m) @ face.normal)[..., None] * face.normal)
+
+
+def reflection_point(
+    face: Face, one_m: FloatArray, other_m: FloatArray, slack_m: float = 0.0
+) -> tuple[FloatArray, BoolArray]:
+    """Where the way from one point to another by a face's mirror meets its plane, and whether it is on the face.
+
+    Parameters
+    ----------
+    face : Face
+    one_m, other_m : (frames, 3) array
+    slack_m : float
+        By how much a point may lie behind the face.
+
+    Returns
+    -------
+    (frames, 3) array
+    (frames,) bool array
+        False too where not both points lie before the face.
+    """
+    one, other = (one_m - face.center_m) @ face.normal, (other_m - face.center_m) @ face.normal
+    front = (one > -slack_m) & (other > -slack_m) & (one + other > 0)
+    share = np.where(front, one, 1.0) / np.where(front, one + other, 2.0)
+    hit = one_m + share[:, None] * (other_m - one_m) - face.center_m
+    inside = (np.abs(hit @ face.across) <= face.width_m / 2) & (np.abs(hit[:, 2]) <= face.height_m / 2)
+    return face.center_m + hit, np.asarray(front & inside)
 
 
 class WallParams(Params):

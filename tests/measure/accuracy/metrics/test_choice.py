@@ -4,7 +4,8 @@ import pytest
 
 from uwbbench.measure.accuracy.metrics.choice import Absent, MetricChoice, combined, names_of
 
-DEFAULT = ["precision", "recall", "f1", "mae", "p90", "p95", "sd", "false_alarms_per_minute", "matched_mae"]
+DEFAULT = ["precision", "recall", "f1", "mae", "bias", "scatter", "p90", "p95", "sd", "false_alarms_per_minute"]
+DEFAULT += ["matched_mae", "matched_bias", "matched_scatter"]
 
 
 def test_every_run_shows_the_default_metrics_in_their_own_order():
@@ -12,11 +13,15 @@ def test_every_run_shows_the_default_metrics_in_their_own_order():
 
 
 def test_a_listed_metric_takes_its_own_place():
-    assert list(MetricChoice(["bias", "mae"])) == [*DEFAULT[:8], "bias", "matched_mae"]
+    assert list(MetricChoice(["bias", "mae"])) == DEFAULT
+    names = list(MetricChoice(["ospa", "mae"], ["track"]))
+    assert names[names.index("ospa") - 1 : names.index("ospa") + 2] == ["gospa_false", "ospa", "precision"]
 
 
 def test_open_truth_leaves_out_what_unmatched_detections_decide():
-    assert MetricChoice().defined(exhaustive=False) == ["recall", "mae", "p90", "p95", "sd", "matched_mae"]
+    assert MetricChoice().defined(exhaustive=False) == [
+        name for name in DEFAULT if name not in ("precision", "f1", "false_alarms_per_minute")
+    ]
 
 
 @pytest.mark.parametrize(
@@ -87,7 +92,7 @@ def test_experiments_that_agree_keep_their_choice_and_others_show_what_any_of_th
     assert combined([exact, dict(exact)]).defined(exhaustive=True) == ["mae", "bias"]
     both = combined([["sd"], exact])
     assert both.listed == ("sd", "mae", "bias")
-    assert both.defined(exhaustive=True) == [*DEFAULT[:8], "bias", "matched_mae"]
+    assert both.defined(exhaustive=True) == DEFAULT
     assert names_of([]) == names_of({}) == []
 
 
@@ -111,5 +116,13 @@ def test_a_listed_metric_is_passed_over_where_it_has_no_meaning():
 
 def test_narrow_tables_of_a_scoring_with_metrics_of_its_own_leave_out_those_that_are_no_headline():
     brief = MetricChoice((), ["track"]).brief
-    assert {"gospa", "track_rmse", "f1"} < set(brief)
+    assert {"gospa", "track_rmse", "f1", "mae", "bias", "scatter"} < set(brief)
     assert not {"precision", "p90", "sd", "gospa_missed"} & set(brief)
+
+
+def test_bias_and_scatter_stand_wherever_their_mean_absolute_error_does():
+    for scoring in ("frame", "object", "track", "segment"):
+        narrow, every = list(MetricChoice((), [scoring]).brief), list(MetricChoice((), [scoring]))
+        for names, start in ((narrow, "mae"), (every, "mae"), (every, "matched_mae")):
+            at = names.index(start)
+            assert names[at + 1 : at + 3] == [start.replace("mae", "bias"), start.replace("mae", "scatter")]

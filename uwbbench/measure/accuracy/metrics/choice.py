@@ -130,7 +130,8 @@ class MetricChoice(Mapping[str, type[Metric]]):
     def _is_narrow(self, name: str, crowded: bool) -> bool:
         """Whether a default metric stands in narrow tables; crowded: where the scoring has metrics of its own."""
         metric = self[name]
-        return metric.brief and not (crowded and metric.of is Outcome and metric.headline is None)
+        leads = metric.headline is not None or (metric.beside in self and self[metric.beside].headline is not None)
+        return metric.brief and (leads or not crowded or metric.of is not Outcome)
 
     def __getitem__(self, name: str) -> type[Metric]:
         return self._by_name[name]

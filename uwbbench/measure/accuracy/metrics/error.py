@@ -120,6 +120,7 @@ class Percentile90(_Percentile):
     kind: ClassVar[Kind] = "quantile"
     level: ClassVar[float] = 0.90
     order: ClassVar[int] = 50
+    brief: ClassVar[bool] = False
     minimum_samples: ClassVar[int] = samples_needed(0.90)
 
     @staticmethod
@@ -160,6 +161,7 @@ class StandardDeviation(_ErrorMetric):
     default: ClassVar[bool] = True
     kind: ClassVar[Kind] = "positive"
     order: ClassVar[int] = 70
+    brief: ClassVar[bool] = False
 
     @staticmethod
     def value(partial: FloatArray) -> float:
@@ -170,14 +172,19 @@ class StandardDeviation(_ErrorMetric):
 class Bias(_ErrorMetric):
     """Mean of the signed errors: positive where ranges are found too long.
 
+    With :class:`Scatter` it takes the root mean square error apart: ``rmse^2 = bias^2 + scatter^2``.
+
     Examples
     --------
     >>> Bias.value(np.array([0.1, -0.3])).__round__(12)
     -0.1
     """
 
+    title: ClassVar[str] = "bias"
+    default: ClassVar[bool] = True
     kind: ClassVar[Kind] = "mean"
-    order: ClassVar[int] = 90
+    order: ClassVar[int] = 42
+    beside: ClassVar[str] = "mae"
     better: ClassVar[Literal["higher", "lower", "zero"]] = "zero"
 
     @staticmethod
@@ -189,3 +196,54 @@ class Bias(_ErrorMetric):
     def parts(cls, partial: FloatArray) -> tuple[float, float]:
         """Sum and number of the signed errors."""
         return float(partial.sum()), float(len(partial))
+
+
+class MatchedBias(Bias):
+    """Mean of the signed errors of true positives alone: what a wrong zero of delay leaves, free of false ones."""
+
+    title: ClassVar[str] = "bias of matches"
+    order: ClassVar[int] = 201
+    beside: ClassVar[str] = "matched_mae"
+    brief: ClassVar[bool] = False
+
+    @staticmethod
+    def partial(outcome: Outcome) -> FloatArray:
+        """Signed errors (n,) of the matched detections."""
+        return _ErrorMetric.partial(matched_only(outcome))
+
+
+class Scatter(_ErrorMetric):
+    """Spread of the signed errors around the bias, which no offset takes away: the population's (divided by n).
+
+    The column ``sd`` of arXiv 2512.01018 is the spread of the absolute errors instead.
+
+    Examples
+    --------
+    >>> Scatter.value(np.array([0.1, -0.3])).__round__(12), Scatter.value(np.array([0.2, 0.2]))
+    (0.2, 0.0)
+    """
+
+    title: ClassVar[str] = "scatter"
+    default: ClassVar[bool] = True
+    kind: ClassVar[Kind] = "positive"
+    order: ClassVar[int] = 44
+    beside: ClassVar[str] = "mae"
+
+    @staticmethod
+    def value(partial: FloatArray) -> float:
+        """Population standard deviation of the signed errors."""
+        return float(np.std(partial)) if len(partial) else math.nan
+
+
+class MatchedScatter(Scatter):
+    """Spread of the signed errors of true positives alone, around their bias."""
+
+    title: ClassVar[str] = "scatter of matches"
+    order: ClassVar[int] = 202
+    beside: ClassVar[str] = "matched_mae"
+    brief: ClassVar[bool] = False
+
+    @staticmethod
+    def partial(outcome: Outcome) -> FloatArray:
+        """Signed errors (n,) of the matched detections."""
+        return _ErrorMetric.partial(matched_only(outcome))
