@@ -115,10 +115,10 @@ class Backprojection(Stage[BackprojectionParams]):
     object that moves does not add up.
 
     In noise alone the sum of n stretches is Gamma distributed, from which the threshold of the evidence follows
-    (:func:`thresholds`). Local maxima above that are crests. A crest is an object only if no stronger object lies within
-    the width of an object, and if it stands above what the responses of the stronger ones may be at its place, worked
-    out from the looks themselves. This takes away the rings through an object that is seen from one side alone, its
-    mirror image beyond a straight way, and the side lobes in range and angle.
+    (:func:`thresholds`). Local maxima above that are crests. A crest is an object only if no stronger object lies
+    within the width of an object, and if it stands above what the responses of the stronger ones may be at its place,
+    worked out from the looks themselves. This takes away the rings through an object that is seen from one side alone,
+    its mirror image beyond a straight way, and the side lobes in range and angle.
 
     One row for each object in view of a frame: ``range_m`` and ``azimuth_rad`` from its receiver, ``x_m`` and ``y_m``,
     ``amplitude``, the square root of the evidence, and ``score_db``, the evidence in dB. Places lie between cells, by
@@ -243,6 +243,17 @@ class Backprojection(Stage[BackprojectionParams]):
         self._search(None)
         rows = self._rows(poses, looks, [self._objects] * len(poses), self._last.frames.index)
         return self._last.replace(detections=rows)
+
+    def evidence(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Map as it is: x (n,) and y (n,) of its columns and rows in the world, and evidence (n, n), row by row."""
+        loops, cells = self._loops, self._cells
+        power = cells[..., loops.REAL] ** 2 + cells[..., loops.IMAGINARY] ** 2
+        running = np.where(cells[..., loops.LOOKS] > 0, power / np.maximum(cells[..., loops.LOOKS], 1) - 1, 0.0)
+        closed = cells[..., loops.CLOSED] - cells[..., loops.STRETCHES]
+        order = np.argsort(self._owner, axis=1)
+        origin_m = np.zeros(2) if self._origin_m is None else self._origin_m
+        x_m, y_m = (np.sort(self._owner, axis=1) + 0.5) * self._at[loops.CELL_M] + origin_m[:, None]
+        return x_m, y_m, (running + closed)[order[1]][:, order[0]]
 
     def _looks_of(self, block: Block) -> tuple[FloatArray, FloatArray, BoolArray]:
         """Looks (frames, LOOK), headings of boresight (frames,), and which frames can be used."""
