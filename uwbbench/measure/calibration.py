@@ -65,14 +65,19 @@ class Calibration:
         Raises
         ------
         ConfigError
-            If not exactly one step takes an offset off the range or off the azimuth, or nothing can be added to what
-            it takes off: a preset instead of a number, say, or an offset of the phase difference.
+            If not exactly one step takes an offset off the range, or several one off the azimuth, or nothing can be
+            added to what one takes off: a preset instead of a number, say, or an offset of the phase difference.
         """
         by_response = self._of_responses()
         settings = by_response or self._added("range_m", self.range_bias_m)
-        return (
-            settings if self.azimuth_bias_rad is None else settings | self._added("azimuth_rad", self.azimuth_bias_rad)
-        )
+        if self.azimuth_bias_rad is None or not self.takes_azimuth:
+            return settings
+        return settings | self._added("azimuth_rad", self.azimuth_bias_rad)
+
+    @property
+    def takes_azimuth(self) -> bool:
+        """Whether some step takes an offset off the azimuth; without one it stays."""
+        return bool(self._changes("azimuth_rad", 0.0))
 
     def _of_responses(self) -> dict[str, float]:
         """Values by path where steps of the detector take the zeros of responses; they leave the range no offset."""
