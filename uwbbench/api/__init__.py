@@ -11,8 +11,10 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from uwbbench.api.aligned import AlignedProfile, Bins, WindowProfile
     from uwbbench.api.anchors import Anchors, Messages
+    from uwbbench.api.apart import in_child
     from uwbbench.api.arrays import BoolArray, ComplexArray, FloatArray, IntArray
     from uwbbench.api.block import Block
+    from uwbbench.api.bounds import check_columns, check_unfolded
     from uwbbench.api.capture import Capture, CaptureHeader, Samples, analytic
     from uwbbench.api.capture_file import list_receivers, open_capture
     from uwbbench.api.capture_writing import write_capture
@@ -67,8 +69,10 @@ if TYPE_CHECKING:
 _HOME = {
     "aligned": ("AlignedProfile", "Bins", "WindowProfile"),
     "anchors": ("Anchors", "Messages"),
+    "apart": ("in_child",),
     "arrays": ("BoolArray", "ComplexArray", "FloatArray", "IntArray"),
     "block": ("Block",),
+    "bounds": ("check_columns", "check_unfolded"),
     "capture": ("Capture", "CaptureHeader", "Samples", "analytic"),
     "capture_file": ("list_receivers", "open_capture"),
     "capture_writing": ("write_capture",),
@@ -202,6 +206,8 @@ __all__ = [
     "bistatic_range",
     "bistatic_range_sine",
     "cases_of",
+    "check_columns",
+    "check_unfolded",
     "checked",
     "compiled",
     "compose",
@@ -211,6 +217,7 @@ __all__ = [
     "expect_arrays",
     "find_config",
     "hard_case",
+    "in_child",
     "inlined",
     "leak_key",
     "leaks",

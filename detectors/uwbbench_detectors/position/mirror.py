@@ -8,6 +8,7 @@ import numpy as np
 from pydantic import Field
 
 from uwbbench.api import SPEED_OF_LIGHT_M_S, Block, FloatArray, Params, Radar, Stage, ports
+from uwbbench_detectors.integrate.motion import plain
 from uwbbench_detectors.position.receivers import of_receiver
 
 
@@ -77,5 +78,5 @@ class MirrorRange(Stage[MirrorRangeParams]):
         """Block whose detections carry ``delay_s`` and ``range_m``."""
         rows = block.detections
         delay_s = (rows["tap"] - block.part("first_path")[block.rows]) * self.radar.sample_interval_s
-        azimuth_rad = np.ascontiguousarray(rows["middle_rad" if "middle_rad" in rows.names else "azimuth_rad"])
-        return block.with_columns(delay_s=delay_s, range_m=self._mirror_ranges(delay_s, azimuth_rad, self.at))
+        azimuth_rad = plain(rows["middle_rad" if "middle_rad" in rows.names else "azimuth_rad"], np.float64)
+        return block.with_columns(delay_s=delay_s, range_m=self._mirror_ranges(plain(delay_s, np.float64), azimuth_rad, self.at))

@@ -62,7 +62,8 @@ class Pdoa(Stage[PdoaParams]):
     Raises
     ------
     ConfigError
-        For a reference other than ``none``, if the radar has no antenna spacing, or its transmitter stands at the receiver and
+        For a reference other than ``none``, if the radar has no antenna spacing, or its transmitter stands at the
+        receiver and
         the direct path has no direction.
 
     References
@@ -144,7 +145,7 @@ def _direct_path_pdoa(radar: Radar, reference: str) -> float:
     distance_m = radar.baseline_length_m
     if distance_m == 0:
         raise ConfigError(
-            f"pdoa: reference '{reference}' needs a transmitter apart from receiver '{radar.receiver}': without a baseline "
-            "the direct path has no direction"
+            f"pdoa: reference '{reference}' needs a transmitter apart from receiver '{radar.receiver}': without a "
+            "baseline the direct path has no direction"
         )
     return float(2 * np.pi * radar.array_spacing_m / radar.wavelength_m * radar.baseline_m[1] / distance_m)

@@ -20,6 +20,9 @@ class FixedTrackParams(MotionParams):
     by_chance: float = Field(0.1, gt=0, lt=1, description="Probability that a look finds something else in its place.")
     most_evidence: float = Field(5.0, gt=0, description="Log odds that an object can gather: it is lost in so many.")
     shown: float = Field(0.0, description="Log odds from which on an object is a row.")
+    holds: float = Field(
+        2.2, description="Log odds from which on an object is a row where it is not measured: nine to one."
+    )
     birth: float = Field(-0.8, description="Log odds of what was detected once.")
     range_sd_m: float = Field(0.06, gt=0, description="Error of a range, of the parts of an extended object.")
     azimuth_sd_deg: float = Field(6.0, gt=0, description="Error of an azimuth.")
@@ -57,6 +60,7 @@ class FixedTrack(Stage[FixedTrackParams]):
             lay.MISS: np.log((1 - p.detected) / (1 - p.by_chance)),
             lay.MOST_EVIDENCE: p.most_evidence,
             lay.SHOWN: p.shown,
+            lay.HOLDS: p.holds,
             lay.FORGOTTEN: p.birth - 1,
             lay.BIRTH: p.birth,
             lay.RANGE_VARIANCE: p.range_sd_m**2,

@@ -173,8 +173,6 @@ def followed(
     objects: FloatArray,
     carried: FloatArray,
     found: FloatArray,
-    start: int,
-    stop: int,
     place_m: FloatArray,
     yaw_rad: float,
     at: FloatArray,
@@ -189,8 +187,7 @@ def followed(
     carried : (CARRIED,) array
         Changed.
     found : (n, GIVEN) array
-    start, stop : int
-        Detections of the frame.
+        Detections of the frame; their first column is overwritten.
     place_m : (3,) array
     yaw_rad : float
     at : (SETTINGS,) array
@@ -223,14 +220,14 @@ def followed(
             objects[place, lay.XX] += at[lay.WANDER] * way_m
             objects[place, lay.YY] += at[lay.WANDER] * way_m
         # The nearest pair first, until none is near enough.
-        for row in range(start, stop):
+        for row in range(len(found)):
             found[row, lay.FRAME] = -1.0
         while True:
             least, which, whom = at[lay.GATE], -1, -1
             for place in range(count):
                 if objects[place, lay.ROW] >= 0:
                     continue
-                for row in range(start, stop):
+                for row in range(len(found)):
                     if found[row, lay.FRAME] >= 0 or not found[row, lay.DETECTED_HELD] == 0:
                         continue
                     off = distance(objects[place], found[row], eye[2], at)
@@ -249,7 +246,7 @@ def followed(
                 item[lay.SEEN_M] = carried[lay.WAY_M]
             elif abs(item[lay.AZIMUTH]) < at[lay.VIEW_RAD] and at[lay.NEAR_M] < item[lay.RANGE] < at[lay.FAR_M]:
                 item[lay.EVIDENCE] += look * at[lay.MISS]
-        for row in range(start, stop):
+        for row in range(len(found)):
             taken = found[row, lay.FRAME] >= 0 or not found[row, lay.DETECTED_HELD] == 0
             if not taken and found[row, lay.DETECTED_M] > 0 and np.isfinite(found[row, lay.DETECTED_RAD]):
                 if count == lay.MOST:
@@ -272,7 +269,8 @@ def followed(
     written = 0
     for place in range(count):
         item = objects[place]
-        if not item[lay.EVIDENCE] >= at[lay.SHOWN] or hidden(objects, count, place, at):
+        least = at[lay.SHOWN] if item[lay.NEWS] == 1 else at[lay.HOLDS]
+        if not item[lay.EVIDENCE] >= least or hidden(objects, count, place, at):
             continue
         if item[lay.NUMBER] < 0:
             item[lay.NUMBER] = carried[lay.NEXT]
@@ -330,7 +328,7 @@ def follow(
         if not looked[frame]:
             continue
         count = followed(
-            objects, carried, found, starts[frame], starts[frame + 1], place_m[frame], yaw_rad[frame], at, rows
+            objects, carried, found[starts[frame] : starts[frame + 1]], place_m[frame], yaw_rad[frame], at, rows
         )
         if written + count > len(table):
             larger = np.empty((2 * len(table), table.shape[1]))

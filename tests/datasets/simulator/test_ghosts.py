@@ -92,13 +92,27 @@ def test_second_echo_matters_for_near_metal_only(make_view, make_term, rng):
     assert level_db(0.5, "metal") - level_db(0.5, "concrete") == pytest.approx(8.1 + 6.0, abs=0.1)
 
 
-@pytest.mark.parametrize("name", ["ghost.wall", "ghost.robot"])
-def test_bound_holds_in_every_frame(make_view, make_term, rng, name):
+def test_a_third_ghost_goes_out_and_back_by_the_wall(make_view, make_term, rng):
+    view = make_view([[0.0, 0.0]], [POST, SIDE_WALL])
+    paths = make_term("ghost.wall", twice=True).paths(view, rng)
+    image = np.array([2.0, 1.8, 0.0])
+    legs = np.linalg.norm(image - view.transmitter_m[0]) + np.linalg.norm(image - view.receiver_m[0])
+    assert paths.delay_s[0, 2] * SPEED_OF_LIGHT_M_S + 0.25 == pytest.approx(legs)
+    assert paths.azimuth_rad[0, 2] == pytest.approx(np.arctan2(1.8, 2.0))
+    echo = np.abs(make_term("echo.point").paths(view, rng).amplitude[0, 0])
+    direct = np.linalg.norm(view.transmitter_m[0] - [2.0, 0.2, 0]) + np.hypot(2.0, 0.2)
+    wall = abs(reflection("concrete", view.radar.center_frequency_hz))
+    assert np.abs(paths.amplitude[0, 2]) == pytest.approx(echo * wall**2 * direct / legs)
+    assert np.array_equal(paths.amplitude[:, :2], make_term("ghost.wall").paths(view, rng).amplitude[:, :2])
+
+
+@pytest.mark.parametrize(("name", "params"), [("ghost.wall", {}), ("ghost.wall", {"twice": True}), ("ghost.robot", {})])
+def test_bound_holds_in_every_frame(make_view, make_term, rng, name, params):
     rod = {"id": "rod", "shape": "rod", "center_m": [1.0, 0.5], "radius_m": 0.05, "height_m": 1.0}
     track = np.column_stack([np.linspace(-1, 0.7, 100), rng.uniform(-1, 0.9, 100)])
     view = make_view(track, [POST, PLATE, rod, SIDE_WALL], yaw_rad=rng.uniform(-3, 3, 100))
     view = make_term("antenna").prepare(view, rng)
-    term = make_term(name)
+    term = make_term(name, **params)
     assert 0 < np.max(np.sum(np.abs(term.paths(view, rng).amplitude), axis=1)) <= term.bound(view)
 
 

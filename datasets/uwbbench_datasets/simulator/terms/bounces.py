@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from itertools import permutations
+from itertools import combinations, permutations, product
 
 import numpy as np
 from pydantic import Field
@@ -20,10 +20,13 @@ from uwbbench.api import (
     View,
     segments_cross,
 )
-from uwbbench_datasets.simulator.shapes import faces
+from uwbbench_datasets.simulator.shapes import Face, faces
 from uwbbench_datasets.simulator.terms.echo import reflected
 from uwbbench_datasets.simulator.terms.scatterers import Scatterers, extended, outline_points, own_stream
 from uwbbench_datasets.simulator.terms.walls import mirrored, reflection_point, walls
+
+_SAME_M = 1e-9
+"""Points nearer than this are one."""
 
 
 class ObjectBounceParams(Params):
@@ -98,9 +101,10 @@ class WallBounce(Term[Params]):
     """Echoes of corners: from the transmitter to one wall, on to another, and back to the receiver.
 
     The mirror image in both walls gives the length ``L`` of the way, its strength is ``G_1 G_2 lambda / (4 pi L)`` with
-    the walls' reflection coefficients, and it shows in the direction of the second wall's point of reflection. In a
-    right-angled corner both orders fly the same length, as if the corner's edge were a mirror, wherever the robot is:
-    a reflector that stands still in the world. An order is there while both points of reflection lie on their walls.
+    the walls' reflection coefficients, and it shows in the direction of the second wall's point of reflection. An order
+    is there while both points of reflection lie on their walls. A right-angled corner has one image, whatever the
+    order, and so one order at a time; with both antennas above one another the orders are equal and share it. It flies
+    as far as to the corner's edge and back, wherever the robot is: a reflector that stands still in the world.
     """
 
     def bound(self, view: View) -> float:
@@ -115,21 +119,29 @@ class WallBounce(Term[Params]):
     def _all(self, view: View) -> Paths | None:
         lengths, strengths, azimuths = [], [], []
         wavelength, frequency = view.radar.wavelength_m, view.radar.center_frequency_hz
-        for (first, one), (second, other) in permutations(walls(view), 2):
+        for (first, one), (second, other) in combinations(walls(view), 2):
             material = reflected(one, frequency) * reflected(other, frequency)
             seen = np.sqrt(view.visibility[:, first] * view.visibility[:, second])
-            for near in faces(one):
-                image = mirrored(view.transmitter_m, near)
-                for far in faces(other):
-                    end, on_far = reflection_point(far, image, view.receiver_m)
-                    _, on_near = reflection_point(near, view.transmitter_m, end)
-                    length = np.linalg.norm(mirrored(image, far) - view.receiver_m, axis=1)
+            for near, far in product(faces(one), faces(other)):
+                orders = _over_both(near, far, view), _over_both(far, near, view)
+                twice = orders[0][1] & orders[1][1] & (np.abs(orders[0][0] - orders[1][0]) < _SAME_M)
+                for length, shown, end in orders:
                     lengths.append(length)
-                    strengths.append(on_far * on_near * seen * material * wavelength / (4 * np.pi * length))
+                    share = np.where(twice, 0.5, shown)
+                    strengths.append(share * seen * material * wavelength / (4 * np.pi * np.maximum(length, 1e-9)))
                     azimuths.append(view.azimuth_rad(end[:, None])[:, 0])
         if not lengths:
             return None
-        return _paths(view, *(np.stack(part, axis=1) for part in (lengths, strengths, azimuths)))
+        return _paths(view, np.stack(lengths, axis=1), np.stack(strengths, axis=1), np.stack(azimuths, axis=1))
+
+
+def _over_both(near: Face, far: Face, view: View) -> tuple[FloatArray, BoolArray, FloatArray]:
+    """Length (frames,) of the way over one face and then another, whether it is there, and its last point."""
+    image = mirrored(view.transmitter_m, near)
+    end, on_far = reflection_point(far, image, view.receiver_m, _SAME_M)
+    _, on_near = reflection_point(near, view.transmitter_m, end, _SAME_M)
+    length = np.linalg.norm(mirrored(image, far) - view.receiver_m, axis=1)
+    return np.asarray(length), on_far & on_near, end
 
 
 def _pairs(start_m: FloatArray, end_m: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -23,13 +23,17 @@ def mirrored(points_m: FloatArray, face: Face) -> FloatArray:
     return np.asarray(points_m - 2 * ((points_m - face.center_m) @ face.normal)[..., None] * face.normal)
 
 
-def reflection_point(face: Face, one_m: FloatArray, other_m: FloatArray) -> tuple[FloatArray, BoolArray]:
+def reflection_point(
+    face: Face, one_m: FloatArray, other_m: FloatArray, slack_m: float = 0.0
+) -> tuple[FloatArray, BoolArray]:
     """Where the way from one point to another by a face's mirror meets its plane, and whether it is on the face.
 
     Parameters
     ----------
     face : Face
     one_m, other_m : (frames, 3) array
+    slack_m : float
+        By how much a point may lie behind the face.
 
     Returns
     -------
@@ -38,7 +42,7 @@ def reflection_point(face: Face, one_m: FloatArray, other_m: FloatArray) -> tupl
         False too where not both points lie before the face.
     """
     one, other = (one_m - face.center_m) @ face.normal, (other_m - face.center_m) @ face.normal
-    front = (one > 0) & (other > 0)
+    front = (one > -slack_m) & (other > -slack_m) & (one + other > 0)
     share = np.where(front, one, 1.0) / np.where(front, one + other, 2.0)
     hit = one_m + share[:, None] * (other_m - one_m) - face.center_m
     inside = (np.abs(hit @ face.across) <= face.width_m / 2) & (np.abs(hit[:, 2]) <= face.height_m / 2)
