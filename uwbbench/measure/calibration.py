@@ -44,8 +44,8 @@ class Calibration:
     range_sd_m : float
         How sure the offset is: its standard deviation. NaN where that is not known.
     zeros_s : mapping
-        Delay of the direct path behind its crest by response, where it was measured itself; the offsets then replace
-        those of the detector, and else are added to them.
+        Delay of the direct path behind the detector's first path by response, where it was measured itself; the
+        offsets then replace those of the detector, and else are added to them.
     """
 
     range_bias_m: float
