@@ -11,6 +11,7 @@ import bat_room
 import coupling
 import loops
 import slam
+import still
 import still_robot
 import walk
 from PIL import Image
@@ -39,12 +40,13 @@ def main(folder: Path) -> None:
     coupling.main(folder / "coupling.png")
     still_robot.main(folder / "still-robot.png")
     walk.main(folder)
+    still.main(folder)
     bat_room.main(folder)
     slam.main(folder)
     loops.main(folder)
     subprocess.run([sys.executable, HERE / "segments.py"], check=True)  # noqa: S603 - our own
     names = ("radargram", "map", "stable-zone", "coupling", "still-robot", "walker-svd", "kalman-track")
-    names += ("slam-points", "slam-lines", "slam-anchors", "slam-graph", "slam-particles")
+    names += ("slam-points", "slam-lines", "slam-anchors", "slam-graph", "slam-particles", "still-walkers", "still-measured")
     for name in (f"{name}.png" for name in names if (folder / f"{name}.png").is_file()):
         shrink(folder / name, IMAGES / name)
     (IMAGES / "examples").mkdir(exist_ok=True)

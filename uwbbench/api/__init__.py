@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from uwbbench.api.compiling import compiled, inlined
     from uwbbench.api.dataset import Card, Dataset, DatasetFile, DatasetFolder
     from uwbbench.api.detections import COLUMNS, Detections
-    from uwbbench.api.direct_path import DirectPath, Located, doubt, stated_pulse
+    from uwbbench.api.direct_path import MINIMUM_ECHOES, DirectPath, Located, doubt, stated_pulse
     from uwbbench.api.drive import Drive, compose, odometry_of, relative
     from uwbbench.api.errors import (
         CaptureError,
@@ -81,7 +81,7 @@ _HOME = {
     "compiling": ("compiled", "inlined"),
     "dataset": ("Card", "Dataset", "DatasetFile", "DatasetFolder"),
     "detections": ("COLUMNS", "Detections"),
-    "direct_path": ("DirectPath", "Located", "doubt", "stated_pulse"),
+    "direct_path": ("MINIMUM_ECHOES", "DirectPath", "Located", "doubt", "stated_pulse"),
     "drive": ("Drive", "compose", "odometry_of", "relative"),
     "errors": ("CaptureError", "ConfigError", "PluginError", "ScoringError", "StoreError", "UwbbenchError", "nearest"),
     "filters": ("Limit", "LimitFilter", "RankFilter", "RankParams"),
@@ -122,6 +122,7 @@ __all__ = [
     "CHANNEL_CENTER_HZ",
     "COLUMNS",
     "LANDMARK_KINDS",
+    "MINIMUM_ECHOES",
     "SPEED_OF_LIGHT_M_S",
     "AlignedProfile",
     "Anchors",
