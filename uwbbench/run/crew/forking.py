@@ -76,7 +76,8 @@ def main() -> NoReturn:
     """Serve the socket whose number is given."""
     leave_to_parent()
     _prepare()
-    _serve(socket.socket(fileno=int(sys.argv[1])))
+    with suppress(BrokenPipeError, ConnectionResetError):  # the run was interrupted, and listens no more
+        _serve(socket.socket(fileno=int(sys.argv[1])))
     sys.exit(0)
 
 
