@@ -46,7 +46,15 @@ def main(folder: Path) -> None:
     loops.main(folder)
     subprocess.run([sys.executable, HERE / "segments.py"], check=True)  # noqa: S603 - our own
     names = ("radargram", "map", "stable-zone", "coupling", "still-robot", "walker-svd", "kalman-track")
-    names += ("slam-points", "slam-lines", "slam-anchors", "slam-graph", "slam-particles", "still-walkers", "still-measured")
+    names += (
+        "slam-points",
+        "slam-lines",
+        "slam-anchors",
+        "slam-graph",
+        "slam-particles",
+        "still-walkers",
+        "still-measured",
+    )
     for name in (f"{name}.png" for name in names if (folder / f"{name}.png").is_file()):
         shrink(folder / name, IMAGES / name)
     (IMAGES / "examples").mkdir(exist_ok=True)
