@@ -223,9 +223,7 @@ class ReflectionFilter(Filter[ReflectionFilterParams]):
         """Look up the baseline."""
         super().open(radar)
         if radar.baseline_length_m == 0:
-            self.note(
-                "filter.reflection left out: transmitter and receiver are in one place, and no baseline scales it"
-            )
+            self.note("filter.reflection left out: transmitter and receiver are in one place, and no baseline scales it")
         self.least = radar.baseline_length_m / 2 * 10 ** (self.params.minimum_db / 20)
 
     def keep(self, block: Block) -> BoolArray:

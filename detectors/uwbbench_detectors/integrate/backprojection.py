@@ -242,9 +242,7 @@ class Backprojection(Stage[BackprojectionParams]):
         """Looks (frames, LOOK), headings of boresight (frames,), and which frames can be used."""
         loops, radar, frames = self._loops, self.radar, block.frames
         place_m, yaw_rad = places_m(self, frames)
-        receiver_m, boresight_rad = receiver_pose(
-            place_m, yaw_rad, np.asarray(radar.mount_position_m), radar.mount_yaw_rad
-        )
+        receiver_m, boresight_rad = receiver_pose(place_m, yaw_rad, np.asarray(radar.mount_position_m), radar.mount_yaw_rad)
         transmitter_m = place_m + rotate_z(np.asarray(radar.tx_position_m), yaw_rad)
         zero = block.part("first_path")
         usable = frames.valid & np.isfinite(receiver_m).all(axis=1) & np.isfinite(boresight_rad) & np.isfinite(zero)
@@ -309,9 +307,7 @@ class Backprojection(Stage[BackprojectionParams]):
         off_m = place_m - looks[of][:, [loops.RX_X, loops.RX_Y]]
         range_m = np.hypot(off_m[:, 0], off_m[:, 1])
         ahead = np.sum(off_m * looks[of][:, [loops.AHEAD_X, loops.AHEAD_Y]], axis=1)
-        seen = (
-            (range_m >= at[loops.NEAREST_M]) & (range_m <= at[loops.FARTHEST_M]) & (ahead >= at[loops.VIEW] * range_m)
-        )
+        seen = (range_m >= at[loops.NEAREST_M]) & (range_m <= at[loops.FARTHEST_M]) & (ahead >= at[loops.VIEW] * range_m)
         azimuth_rad = np.arctan2(off_m[:, 1], off_m[:, 0]) - poses[of, 1]
         origin_m = np.zeros(2) if self._origin_m is None else self._origin_m
         rows = Detections(

@@ -199,7 +199,9 @@ def between(before: float, here: float, after: float) -> float:
 
 
 @compiled
-def crests(cells: FloatArray, owner: IntArray, look: FloatArray, at: FloatArray, thresholds: FloatArray) -> FloatArray:
+def crests(
+    cells: FloatArray, owner: IntArray, look: FloatArray, at: FloatArray, thresholds: FloatArray
+) -> FloatArray:
     """Find the crests of the map that noise does not explain, in view of a look.
 
     Parameters

@@ -151,7 +151,9 @@ class DopplerRange(Stage[DopplerRangeParams]):
         place_m, yaw_rad = places_m(self, frames)
         valid = plain(frames.valid, np.bool_)
         state = self.bins, self.carried, self.noise, self.come, self.sums, self.at, self.rows
-        table = self._bank_frames(first, second, self.params.second, valid, place_m, yaw_rad, frames.first, *state)
+        table = self._bank_frames(
+            first, second, self.params.second, valid, place_m, yaw_rad, frames.first, *state
+        )
         width = 1 + len(self.names)
         made = Detections.of_table(self.names, table[:, :width], (frames.first, frames.valid), self.notes)
         return block.replace(detections=made)

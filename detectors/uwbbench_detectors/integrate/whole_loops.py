@@ -233,14 +233,13 @@ def whole_frames(
         )
         if follows:
             for row in range(count):
-                found[row, fixed.DETECTED_M], found[row, fixed.DETECTED_RAD] = (
-                    left[row, RANGE_M],
-                    left[row, AZIMUTH_RAD],
-                )
+                found[row, fixed.DETECTED_M], found[row, fixed.DETECTED_RAD] = left[row, RANGE_M], left[row, AZIMUTH_RAD]
                 found[row, fixed.DETECTED_AMPLITUDE] = left[row, lay.AMPLITUDE]
                 found[row, fixed.DETECTED_DB] = left[row, lay.SCORE_DB]
                 found[row, fixed.DETECTED_HELD] = left[row, lay.HELD]
-            count = followed(objects, fixed_carried, found[:count], place_m[frame], yaw_rad[frame], at_fixed, rows)
+            count = followed(
+                objects, fixed_carried, found[:count], place_m[frame], yaw_rad[frame], at_fixed, rows
+            )
         if written + count > len(table):
             larger = np.empty((2 * len(table), width))
             larger[:written] = table[:written]

@@ -20,9 +20,7 @@ class DopplerPhaseParams(Params):
         "directions, and of the odometry's direction.",
     )
     phase_sd_rad: float = Field(
-        0.1,
-        gt=0,
-        description="Error of the phase difference beside noise: antennas whose phase hangs on the direction.",
+        0.1, gt=0, description="Error of the phase difference beside noise: antennas whose phase hangs on the direction."
     )
     loose_sd_rad: float = Field(
         0.25,

@@ -92,6 +92,8 @@ class FixedTrack(Stage[FixedTrackParams]):
         for place, name in enumerate(("range_m", "azimuth_rad", "amplitude", "score_db", "held"), 1):
             found[:, place] = rows[name]
         starts = np.searchsorted(block.rows, np.arange(len(frames) + 1))
-        table = self._follow(self.objects, self.carried, found, starts, looked, place_m, yaw_rad, frames.first, self.at)
+        table = self._follow(
+            self.objects, self.carried, found, starts, looked, place_m, yaw_rad, frames.first, self.at
+        )
         tracks = Detections.of_table(lay.NAMES, table, (frames.first, frames.valid), rows.notes)
         return block.replace(detections=tracks)
