@@ -199,7 +199,7 @@ class ReflectionFilterParams(Params):
     """Weakest mirror."""
 
     minimum_db: float = Field(
-        -16.0,
+        -18.0,
         description="Amplitude relative to that of a perfect mirror. Plaster and wood reflect -8 to -15 dB, and what is "
         "smaller than the first Fresnel zone less; isolation between the antennas adds to all amplitudes, 6 to 12 dB on "
         "the robots that are known.",
