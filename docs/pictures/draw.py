@@ -9,6 +9,7 @@ from pathlib import Path
 
 import bat_room
 import coupling
+import hard_rooms
 import loops
 import slam
 import still_robot
@@ -38,13 +39,14 @@ def main(folder: Path) -> None:
     shutil.copyfile(folder / "figures" / "pareto-1-frame-filtering-f1.svg", IMAGES / "speed-against-f1.svg")
     coupling.main(folder / "coupling.png")
     still_robot.main(folder / "still-robot.png")
+    hard_rooms.main(folder / "hard-room.png")
     walk.main(folder)
     bat_room.main(folder)
     slam.main(folder)
     loops.main(folder)
     subprocess.run([sys.executable, HERE / "segments.py"], check=True)  # noqa: S603 - our own
     names = ("radargram", "map", "stable-zone", "coupling", "still-robot", "walker-svd", "kalman-track")
-    names += ("slam-points", "slam-lines", "slam-anchors", "slam-graph", "slam-particles")
+    names += ("hard-room", "slam-points", "slam-lines", "slam-anchors", "slam-graph", "slam-particles")
     for name in (f"{name}.png" for name in names if (folder / f"{name}.png").is_file()):
         shrink(folder / name, IMAGES / name)
     (IMAGES / "examples").mkdir(exist_ok=True)
