@@ -210,7 +210,7 @@ def test_a_seed_in_a_message_is_hidden(suite: Path, seeds: Path, tmp_path: Path,
         raise ValueError(f"seed {self.secret['seed']} is unlucky")
 
     monkeypatch.setattr(CaptureRef, "open", fail)
-    folder = run_experiment(read_experiment(suite, quick=True, seeds=seeds), tmp_path / "run", jobs=1)
+    folder = run_experiment(read_experiment(suite, quick=True, seeds=seeds), tmp_path / "run", isolated=False)
     assert {entry.reason for entry in folder.entries()} == {f"ValueError: seed {HIDDEN} is unlucky"}
     assert str(read_seeds(seeds).of("plate")).encode() not in stored(folder.path)
 

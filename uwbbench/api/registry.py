@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import importlib
 import importlib.util
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from importlib.metadata import Distribution, entry_points
@@ -83,11 +84,30 @@ def entries(kind: Group) -> dict[str, Entry]:
     return known
 
 
+def registered() -> dict[tuple[str, str], type[Any]]:
+    """Classes that were given a name in this process, by kind and name."""
+    return dict(_registered)
+
+
+def take_over(classes: Mapping[tuple[str, str], type[Any]]) -> None:
+    """Know just these classes by the names that they were given in another process.
+
+    Parameters
+    ----------
+    classes : mapping
+        As :func:`registered` gives them there.
+    """
+    _registered.clear()
+    _registered.update(classes)
+    entries.cache_clear()
+    load_plugin.cache_clear()
+
+
 def register(kind: Literal["stages", "mappers", "datasets", "metrics", "terms"], name: str, plugin: type[Any]) -> None:
     """Give a class a name in this process, as an entry point of an installed package does everywhere.
 
-    For scripts and notebooks. Other processes do not know the name: what runs in several, is timed, or is called from
-    the command line needs a package, which ``uwbbench new`` writes.
+    For scripts and notebooks. The workers of a run are given the class; other processes do not know the name: what is
+    timed, or called from the command line, needs a package, which ``uwbbench new`` writes.
 
     Parameters
     ----------

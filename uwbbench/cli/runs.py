@@ -51,6 +51,14 @@ def run(
         Path | None,
         typer.Option(metavar="FILE", help="Draw its captures from these secret seeds: its private half."),
     ] = None,
+    isolation: Annotated[
+        bool,
+        typer.Option(
+            "--isolation/--no-isolation",
+            help="Each detector in processes of its own, with limits. Without, for a debugger: a detector can then "
+            "change what others find, and end or hang the run.",
+        ),
+    ] = True,
     settings: options.Settings = None,
     json: options.Json = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress on the terminal.")] = False,
@@ -74,7 +82,9 @@ def run(
     _say_left_out(plan)
     try:
         with _progress_bar(quiet) as advance:
-            folder = run_experiment(plan, resume or out, jobs=jobs, resume=resume is not None, progress=advance)
+            folder = run_experiment(
+                plan, resume or out, jobs=jobs, resume=resume is not None, isolated=isolation, progress=advance
+            )
     except Interrupted as stop:
         typer.echo(str(stop), err=True)
         raise typer.Exit(INTERRUPTED) from stop
@@ -219,12 +229,14 @@ def _conclude(folder: RunFolder, data_dir: Path | None, *, json: bool) -> None:
 
     with read_safely(folder.path):
         run_report = Report(folder)
+        if json:
+            render.print_json(formats.as_json(run_report))
+        else:
+            render.print_leaderboard(run_report)
         path, missing = written.write_into_run(run_report, data_roots(data_dir))
         render.print_notes([missing] if missing else [])
         if json:
-            render.print_json(formats.as_json(run_report))
             return
-        render.print_leaderboard(run_report)
     typer.echo(f"run folder: {folder.path} (all tables: {path}, or 'uwbbench report {folder.path}')")
 
 

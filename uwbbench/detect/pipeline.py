@@ -20,7 +20,7 @@ from uwbbench.api.radar import Radar
 from uwbbench.api.stage import Stage
 from uwbbench.api.weights import load_weights
 from uwbbench.config.detector import DetectorConfig, Step, detector_from_text, read_detector
-from uwbbench.config.identity import KERNEL, MAPPER, detector_identity
+from uwbbench.config.identity import KERNEL, MAPPER, detector_identity, inside, named_within
 from uwbbench.config.weights import portable_weights
 from uwbbench.detect.hand_out import with_hand_outs
 from uwbbench.detect.opening import Chosen, background_of, opened
@@ -257,7 +257,7 @@ class Pipeline:
         maker = next(step for step in steps if "detections" in registry.load_plugin("stages", step.use).produces)
         return self.arriving(capture, maker.label)
 
-    def arriving(self, capture: Capture, label: str) -> Iterator[Block]:
+    def arriving(self, capture: Capture, label: str, *, sts: bool = False) -> Iterator[Block]:
         """Blocks as a step finds them; neither it nor those behind it are opened.
 
         Parameters
@@ -265,6 +265,8 @@ class Pipeline:
         capture : Capture
         label : str
             Of the step.
+        sts : bool
+            Read STS responses even if no step before it needs them.
 
         Yields
         ------
@@ -272,7 +274,7 @@ class Pipeline:
         """
         steps, _ = self._opened(capture, label)
         stream = Stream(steps, [])
-        for frames in capture.blocks(BATCH_FRAMES, sts="sts" in stream.needs):
+        for frames in capture.blocks(BATCH_FRAMES, sts=sts or "sts" in stream.needs):
             yield stream.through(Block(frames.without_invalid()))
         yield from stream.tails()
 
@@ -289,6 +291,8 @@ class Pipeline:
         if self.config.mapper is not None:
             used = self.config.mapper.use
             hashes[f"{MAPPER}{used}"] = source_hash(registry.load_plugin("mappers", used).__module__)
+            for other in set(named_within(self.config.mapper.params)) & set(registry.entries("mappers")):
+                hashes[inside(used, other)] = source_hash(registry.load_plugin("mappers", other).__module__)
         for name in registry.entries("kernels"):
             with contextlib.suppress(PluginError):  # one that cannot be loaded is not used
                 hashes[f"{KERNEL}{name}"] = source_hash(registry.load_plugin("kernels", name).__module__)

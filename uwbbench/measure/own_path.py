@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -20,6 +20,9 @@ from uwbbench.detect.pipeline import Pipeline
 from uwbbench.measure.calibration import Calibration, stages_of
 
 RESPONSES = ("preamble", "sts1", "sts2")
+NEAR_S = 8e-9
+"""Delay up to which an echo lies on the ringing that locates the direct path."""
+
 _MOST_FRAMES = 4000
 """Frames that a template is learned from; of longer captures every n-th."""
 
@@ -32,7 +35,7 @@ class OwnPath:
     ----------
     receiver, response : str
     frames : int
-        With a direct path; the template is their mean.
+        With a direct path; the template is the mean of those without an echo on their ringing.
     snr_db : float
         Crest of the direct path over the noise of one frame.
     crest_sd_m : float
@@ -128,20 +131,16 @@ def calibrate_zero(detector: Pipeline, capture: Capture, pulse: PulseShape | Non
         if path.doubt and (path is preamble or _takes(detector, capture, path.response)):
             raise ScoringError(f"capture '{capture.name}', receiver '{path.receiver}', {path.response}: {path.doubt}")
     assert preamble.located is not None  # noqa: S101 - there is a doubt without
-    direct = DirectPath(capture.radar)
-    late = []
-    for block in _located_blocks(detector, capture):
-        every = _every(len(block.frames))
-        for samples, first_path in zip(block.frames.preamble[every], block.part("first_path")[every], strict=True):
-            found = direct.aligned(samples)
-            if found is not None and np.isfinite(first_path):
-                late.append(found[0] - first_path)
-    if not late:
+    late_s = _late_s(detector, capture, [path.response for path in own])
+    if "preamble" not in late_s:
         raise ScoringError(f"detector '{detector.name}' found no first path on capture '{capture.name}'")
-    off_s = float(np.median(late)) * capture.radar.sample_interval_s + preamble.located.delay_s
-    zeros_s = {path.response: path.located.delay_s for path in own if path.located is not None and not path.doubt}
+    zeros_s = {
+        path.response: late_s[path.response] + path.located.delay_s
+        for path in own
+        if path.located is not None and not path.doubt and path.response in late_s
+    }
     return Calibration(
-        range_bias_m=off_s * SPEED_OF_LIGHT_M_S / 2,
+        range_bias_m=zeros_s["preamble"] * SPEED_OF_LIGHT_M_S / 2,
         azimuth_bias_rad=None,
         n=preamble.frames,
         stages=stages_of(detector, capture.radar),
@@ -157,11 +156,28 @@ def _takes(detector: Pipeline, capture: Capture, response: str) -> bool:
     return any(stage.recalibrated(f"{response}_delay_s", 0.0) for stage in stages)
 
 
+def _late_s(detector: Pipeline, capture: Capture, responses: Sequence[str]) -> dict[str, float]:
+    """Median delay of the crest of each response behind the detector's first path, in the frames it is given."""
+    direct = DirectPath(capture.radar)
+    late: dict[str, list[float]] = {name: [] for name in responses}
+    for block in _located_blocks(detector, capture):
+        every = _every(len(block.frames))
+        for name in responses:
+            for samples, first_path in zip(
+                getattr(block.frames, name)[every], block.part("first_path")[every], strict=True
+            ):
+                found = direct.aligned(samples)
+                if found is not None and np.isfinite(first_path):
+                    late[name].append(found[0] - first_path)
+    interval_s = capture.radar.sample_interval_s
+    return {name: float(np.median(taps)) * interval_s for name, taps in late.items() if taps}
+
+
 def _located_blocks(detector: Pipeline, capture: Capture) -> Iterator[Block]:
-    """Blocks behind the step that gives the first path."""
+    """Blocks behind the step that gives the first path, with all responses."""
     for step, after in pairwise(detector.config.steps):
         if "first_path" in registry.load_plugin("stages", step.use).produces:
-            return detector.arriving(capture, after.label)
+            return detector.arriving(capture, after.label, sts=capture.radar.has_sts)
     raise ConfigError(f"detector '{detector.name}' has no step that gives a first path")
 
 
@@ -179,7 +195,7 @@ def _own_path(capture: Capture, response: str, rows: ComplexArray, pulse: PulseS
     frames = [found[1] for samples in rows if (found := direct.aligned(samples)) is not None]
     if not frames:
         raise ScoringError(f"capture '{capture.name}': no frame's {response} has a direct path 20 dB above its median")
-    for frame in frames:
+    for frame in _calm(np.array(frames), direct):
         direct.learn(frame)
     for frame in frames:
         direct.listen(frame)
@@ -199,7 +215,7 @@ def _own_path(capture: Capture, response: str, rows: ComplexArray, pulse: PulseS
     return OwnPath(
         receiver=capture.radar.receiver,
         response=response,
-        frames=direct.count,
+        frames=len(frames),
         snr_db=-10 * math.log10(direct.noise) if direct.noise > 0 else math.inf,
         crest_sd_m=direct.crest_sd_s * SPEED_OF_LIGHT_M_S / 2,
         ringing_db=20 * math.log10(max(float(np.abs(behind).max(initial=0.0)), 1e-12)),
@@ -210,6 +226,16 @@ def _own_path(capture: Capture, response: str, rows: ComplexArray, pulse: PulseS
         template=direct.template,
         crest=direct.crest,
     )
+
+
+def _calm(frames: ComplexArray, direct: DirectPath) -> ComplexArray:
+    """Aligned frames without an echo so near that it would be learned as ringing; all, where fewer than 40 are."""
+    usual = np.median(frames.real, axis=0) + 1j * np.median(frames.imag, axis=0)
+    power = np.abs(frames - usual) ** 2
+    noise = np.median(power, axis=1) / math.log(2)
+    near = power[:, direct.crest + 1 : direct.crest + round(NEAR_S / direct.interval_s)].max(axis=1, initial=0.0)
+    calm = near < 20 * noise
+    return frames[calm] if calm.sum() >= MINIMUM_ECHOES else frames
 
 
 def _width_s(time_s: FloatArray, height: ComplexArray) -> float:

@@ -3,20 +3,16 @@
 from __future__ import annotations
 
 import dataclasses
-import os
 import re
 import time
 import traceback
 import uuid
-from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures.process import BrokenProcessPool
-from contextlib import suppress
+from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 from typing import Any
-
-from joblib import Parallel, delayed
 
 from uwbbench.api.errors import StoreError, UwbbenchError
 from uwbbench.api.interruption import by_plugin, listening
@@ -29,6 +25,8 @@ from uwbbench.measure.accuracy.rules import rules_on
 from uwbbench.measure.accuracy.scoring import ScoringRules
 from uwbbench.measure.latency.machine import machine, usable_cores
 from uwbbench.run import environment
+from uwbbench.run.accuracy import PATIENCE_S, AccuracyPass, contents
+from uwbbench.run.crew import Hands, Raised, Task, crew_of, prepare, unpacked
 from uwbbench.run.experiment import Experiment
 from uwbbench.run.folder.folder import RunFolder
 from uwbbench.run.folder.identity import accuracy_identity, canonical, latency_identity, plain, stability_name
@@ -39,8 +37,9 @@ from uwbbench.run.hard_cases import examined
 from uwbbench.run.hard_cases import failed as unexamined
 from uwbbench.run.hard_cases import identity_of as identity_of_cases
 from uwbbench.run.leaks import refuse_trained_on
+from uwbbench.run.limits import Allowance
 from uwbbench.run.plan import Plan, Unit, plan, reason_of
-from uwbbench.run.unit import Finished, Job, content_of, entry_of, run_unit
+from uwbbench.run.unit import Finished, Job, entry_of
 
 
 class Interrupted(UwbbenchError):
@@ -80,6 +79,7 @@ def run_experiment(
     *,
     jobs: int | None = None,
     resume: bool = False,
+    isolated: bool = True,
     progress: Callable[[Progress], None] | None = None,
 ) -> RunFolder:
     """Run an experiment into a run folder.
@@ -96,6 +96,9 @@ def run_experiment(
     resume : bool
         Continue: units whose detector, sources, capture content and scoring are unchanged are not repeated. Failed
         ones are.
+    isolated : bool
+        Run each detector in processes of its own, and score elsewhere. Without, everything runs in this process, where
+        a debugger is: a detector can then change what others find, end the run or hang it, and no limit is kept.
     progress : callable, optional
         Called with a :class:`Progress` after each unit.
 
@@ -113,13 +116,16 @@ def run_experiment(
         If the user interrupts; nothing finished is lost.
     """
     workers = usable_cores() if jobs is None else max(1, jobs)
+    if isolated:
+        prepare()  # while the plan is made
     todo = plan(experiment)
     _refuse_leaks(experiment, todo)
     made = _resumed if resume else _created
-    folder = made(experiment, todo, out, workers)
+    session = {**environment.session(workers), "isolated": isolated, "limits": experiment.limits.model_dump()}
+    folder = made(experiment, todo, out, session)
     try:
-        with listening():
-            _Run(folder, experiment, todo, workers, progress).carry_out()
+        with listening(), crew_of(workers, experiment.limits.memory_mb, isolated=isolated) as hands:
+            _Run(folder, experiment, todo, hands, progress).carry_out()
         folder.seal()
     except KeyboardInterrupt:
         raise Interrupted(folder.path) from None
@@ -135,7 +141,7 @@ def _refuse_leaks(experiment: Experiment, todo: Plan) -> None:
         refuse_trained_on((one for one in experiment.runnable if not names or one.name in names), captures)
 
 
-def _created(experiment: Experiment, todo: Plan, out: Path | None, jobs: int) -> RunFolder:
+def _created(experiment: Experiment, todo: Plan, out: Path | None, session: dict[str, Any]) -> RunFolder:
     if out is None:
         safe = re.sub(r"[^\w.-]+", "-", experiment.name, flags=re.ASCII).strip("-.")[:60] or "run"
         out = Path("runs") / f"{safe}-{datetime.now():%Y%m%d-%H%M%S}"
@@ -147,7 +153,7 @@ def _created(experiment: Experiment, todo: Plan, out: Path | None, jobs: int) ->
         **({"runs": todo.runs} if todo.runs else {}),
         **_reported(experiment),
         **({} if experiment.frozen is None else {"frozen": experiment.frozen.contents()}),
-        "sessions": [environment.session(jobs)],
+        "sessions": [session],
     }
     return RunFolder.create(out, manifest)
 
@@ -178,7 +184,7 @@ def _code(experiment: Experiment, todo: Plan) -> dict[str, Any]:
     }
 
 
-def _resumed(experiment: Experiment, todo: Plan, out: Path | None, jobs: int) -> RunFolder:
+def _resumed(experiment: Experiment, todo: Plan, out: Path | None, session: dict[str, Any]) -> RunFolder:
     if out is None:
         raise StoreError("resuming needs the run folder to continue")
     folder = RunFolder(out)
@@ -198,7 +204,7 @@ def _resumed(experiment: Experiment, todo: Plan, out: Path | None, jobs: int) ->
         scenes={**folder.manifest.get("scenes", {}), **todo.scenes},
         skipped=todo.skipped,
         **({"runs": todo.runs} if todo.runs else {}),
-        sessions=[*folder.manifest["sessions"], environment.session(jobs)],
+        sessions=[*folder.manifest["sessions"], session],
     )
     return folder
 
@@ -211,14 +217,15 @@ class _Run:
         folder: RunFolder,
         experiment: Experiment,
         todo: Plan,
-        workers: int,
+        hands: Hands,
         progress: Callable[[Progress], None] | None,
     ) -> None:
         self.folder, self.experiment, self.plan = folder, experiment, todo
-        self.workers, self.progress = workers, progress
+        self.hands, self.progress = hands, progress
         self.rules = rules_of(experiment.to_dict())
         self.session = uuid.uuid4().hex
         self.done = self.total = 0
+        self._identities: dict[str, str] = {}
 
     def carry_out(self) -> None:
         before = {entry.unit: entry for entry in self.folder.entries()}
@@ -267,44 +274,41 @@ class _Run:
 
     def _examine(self, detectors: list[DetectorConfig]) -> None:
         """Examine detectors with the hard cases; one that takes its process down does not take the others' results."""
-        remaining = {stability_name(detector.name): detector for detector in detectors}
-        try:
-            for entry in self._results(delayed(examined)(detector, os.getpid()) for detector in detectors):
-                del remaining[entry.unit]
-                self._journal(entry)
-        except BrokenProcessPool as error:
-            reason = f"{type(error).__name__}: a process died over the hard cases of this detector or one beside it"
-            for detector in remaining.values():
-                self._journal(unexamined(detector, reason))
-
-    def _results(self, calls: Iterable[Any]) -> Iterator[Any]:
-        """Results of joblib calls as they come in."""
-        todo = list(calls)
-        if not todo:
-            return
-        pool: Any = Parallel(n_jobs=min(self.workers, len(todo)), return_as="generator_unordered", batch_size=1)
-        results = pool(todo)
-        try:
-            yield from results
-        finally:
-            with suppress(BrokenProcessPool):
-                results.close()
+        waiting, running = deque(detectors), dict[Task, DetectorConfig]()
+        limit_s = self.experiment.limits.unit_s or PATIENCE_S
+        while waiting or running:
+            while waiting and len(running) < self.hands.size:
+                detector = waiting.popleft()
+                task = Task(f"detector {detector.name}", examined, (detector,), limit_s, ", its limit")
+                running[task] = detector
+                self.hands.start(task)
+            ending = self.hands.next()
+            detector = running.pop(ending.task)
+            if ending.message is None:
+                raised = ending.raised or Raised("it gave nothing", "")
+                self._journal(unexamined(detector, raised.reason, raised.traceback))
+            else:
+                self._journal(unpacked(ending.message))
 
     def _pending(self, before: dict[str, Entry]) -> list[Unit]:
         """Units to run: all but those that gave the same before."""
         maybe = [unit for unit in self.plan.units if unit.id in before and before[unit.id].status == "done"]
         captures = {unit.capture_id: unit for unit in maybe}
-        jobs = [delayed(content_of)(self._job(unit)) for unit in captures.values()]
-        contents = dict(zip(captures, Parallel(n_jobs=self.workers)(jobs), strict=True)) if jobs else {}
-        same = {
-            unit.id for unit in maybe if before[unit.id].identity == self._identity(unit, contents[unit.capture_id])
-        }
+        sha256 = contents(self.hands, [self._job(unit) for unit in captures.values()])
+        same = {unit.id for unit in maybe if before[unit.id].identity == self._identity(unit, sha256[unit.capture_id])}
         return [unit for unit in self.plan.units if unit.id not in same]
 
     def _job(self, unit: Unit) -> Job:
         frozen = self.experiment.frozen
         mark = None if frozen is None else frozen.only(unit.dataset, unit.ref.name)
-        return Job(unit, self._rules(unit.dataset), self.session, os.getpid(), mark)
+        identity = "" if unit.detector.results is not None else self._detector_identity(unit.detector)
+        return Job(unit, self._rules(unit.dataset), self.session, identity, mark)
+
+    def _detector_identity(self, detector: DetectorConfig) -> str:
+        """Identity of a detector, for which all its sources are read: once."""
+        if detector.name not in self._identities:
+            self._identities[detector.name] = Pipeline(detector).identity
+        return self._identities[detector.name]
 
     def _rules(self, dataset: str) -> tuple[ScoringRules, ...]:
         """Rules of the captures of one dataset."""
@@ -313,7 +317,7 @@ class _Run:
     def _identity(self, unit: Unit, sha256: str) -> str:
         """Identity of a unit on a capture of this content, here and now."""
         if unit.detector.results is None:
-            detector = Pipeline(unit.detector).identity
+            detector = self._detector_identity(unit.detector)
         else:
             stored = ResultsFolder(unit.detector)
             detector = stored.identity(stored.content(unit.dataset, unit.ref.name))
@@ -322,23 +326,9 @@ class _Run:
         return accuracy_identity(detector, sha256, self._rules(unit.dataset))
 
     def _detect(self, units: list[Unit]) -> None:
-        remaining = {unit.id: unit for unit in units}
-        try:
-            for finished in self._results(delayed(run_unit)(self._job(unit)) for unit in units):
-                del remaining[finished.entry.unit]
-                self._store(finished)
-        except BrokenProcessPool:  # a worker died; which unit killed it is not known, so the rest runs one by one
-            for unit in remaining.values():
-                self._store(self._isolated(unit))
-
-    def _isolated(self, unit: Unit) -> Finished:
-        """One unit in a process of its own, which it may take down."""
-        try:
-            finished: Finished = Parallel(n_jobs=2)([delayed(run_unit)(self._job(unit))])[0]
-        except BrokenProcessPool as error:
-            reason = f"{type(error).__name__}: the process died, out of memory or by a crash"
-            return Finished(entry_of(unit, "failed", reason=reason))
-        return finished
+        allowance = Allowance(self.experiment.limits)
+        for finished in AccuracyPass(self.hands, [self._job(unit) for unit in units], allowance).finished():
+            self._store(finished)
 
     def _store(self, finished: Finished) -> None:
         entry = finished.entry

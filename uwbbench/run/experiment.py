@@ -27,6 +27,7 @@ from uwbbench.measure.latency.settings import LatencyModel
 from uwbbench.run.combine import combined
 from uwbbench.run.contenders import DetectorItem, read_detectors, with_absolute_paths
 from uwbbench.run.folder.scored import rules_of
+from uwbbench.run.limits import LimitsModel
 from uwbbench.run.suite import WHOLE, Frozen, SuitePart, read_frozen
 
 
@@ -90,6 +91,7 @@ class ExperimentModel(ConfigModel):
     )
     latency: LatencyModel = Field(default_factory=LatencyModel)
     stability: bool = Field(default=True, description="Put the hard cases to each detector; see 'uwbbench stability'.")
+    limits: LimitsModel = Field(default_factory=LimitsModel, description="What a unit may take.")
     seed: int = Field(default=0, ge=0, description="Of what reports draw: the probability of being on a front.")
     intervals: IntervalModel = Field(default_factory=IntervalModel)
     quick: QuickModel | None = Field(default=None, description="A smaller version of it, for 'run --quick'.")
@@ -131,6 +133,8 @@ class Experiment:
     stability : bool
     seed : int
     intervals : IntervalModel
+    limits : LimitsModel
+        Not part of what the results depend on: a run may be resumed with others.
     part : SuitePart
         Which part of a suite it is.
     frozen : Frozen or None
@@ -153,6 +157,7 @@ class Experiment:
     stability: bool
     seed: int
     intervals: IntervalModel
+    limits: LimitsModel = field(default_factory=LimitsModel)
     part: SuitePart = WHOLE
     frozen: Frozen | None = field(default=None, repr=False)
     left_out: tuple[str, ...] = ()
@@ -249,6 +254,7 @@ def read_experiment(
         stability=model.stability,
         seed=model.seed,
         intervals=model.intervals,
+        limits=model.limits,
     )
     experiment = _frozen(experiment, read_frozen(path) if frozen else None)
     if quick:

@@ -14,7 +14,6 @@ from uwbbench.run.environment import case_packages
 from uwbbench.run.folder.identity import stability_identity, stability_name
 from uwbbench.run.folder.journal import Entry
 from uwbbench.run.plan import reason_of
-from uwbbench.run.unit import die_with
 
 
 def identity_of(detector: DetectorConfig) -> str:
@@ -22,7 +21,7 @@ def identity_of(detector: DetectorConfig) -> str:
     return stability_identity(Pipeline(detector).identity, __version__, case_packages())
 
 
-def examined(detector: DetectorConfig, parent: int) -> Entry:
+def examined(detector: DetectorConfig) -> Entry:
     """Entry of a detector.
 
     One that refuses the capture of the cases is no failure: its reason is all there is. One that breaks is.
@@ -31,7 +30,6 @@ def examined(detector: DetectorConfig, parent: int) -> Entry:
 
     from uwbbench.measure.robustness import examine
 
-    die_with(parent)
     try:
         with threadpool_limits(1):
             facts = examine(Pipeline(detector)).to_dict()

@@ -1,20 +1,21 @@
-"""Executing one accuracy unit, in whatever process: any exception becomes a failed entry."""
+"""The parts of one accuracy unit: its capture is opened, the detector finds, what it found is scored."""
 
 from __future__ import annotations
 
 import os
 import threading
 import time
-import traceback
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 from uwbbench.api.arrays import FloatArray
 from uwbbench.api.capture import Capture, CaptureHeader
 from uwbbench.api.detections import HANDED_OUT, Detections
 from uwbbench.api.drive import Drive
-from uwbbench.api.interruption import by_plugin, leave_to_parent
+from uwbbench.api.errors import PluginError
+from uwbbench.api.interruption import leave_to_parent
 from uwbbench.config.detector import DetectorConfig
 from uwbbench.config.identity import RESULTS_FILE
 from uwbbench.config.source import CaptureRef, RunRef
@@ -25,26 +26,28 @@ from uwbbench.detect.results_folder import ResultsFolder
 from uwbbench.measure.accuracy.ranked import RankedCounts, ranked
 from uwbbench.measure.accuracy.scene import Scene
 from uwbbench.measure.accuracy.scoring import ScoringRules
+from uwbbench.run.crew.handed import hand_over, taken
+from uwbbench.run.crew.messages import unpacked
 from uwbbench.run.folder.identity import accuracy_identity
 from uwbbench.run.folder.journal import Entry, Status
 from uwbbench.run.folder.reported import REPORTED_FACT, RESULTS_FACT, reported_times
 from uwbbench.run.folder.scored import scorable, score_rows, with_causes
-from uwbbench.run.plan import Unit, reason_of
+from uwbbench.run.plan import Unit
 from uwbbench.run.suite import ChangedCapture, Frozen
 
 
 @dataclass(frozen=True)
 class Job:
-    """A unit with all that a worker process needs to know.
+    """A unit with all that a worker needs to know.
 
     Attributes
     ----------
     unit : Unit
     rules : tuple of ScoringRules
     session : str
-        Distinct for each run: a worker that outlives a run must not use its captures for the next.
-    parent : int
-        The process that runs the experiment.
+        Distinct for each run: a process that outlives a run must not use its captures for the next.
+    identity : str
+        Of the detector; empty where another program has found what there is.
     frozen : Frozen or None
         What the capture is held against.
     """
@@ -52,8 +55,44 @@ class Job:
     unit: Unit
     rules: tuple[ScoringRules, ...]
     session: str
-    parent: int
+    identity: str = ""
     frozen: Frozen | None = None
+
+
+@dataclass(frozen=True)
+class Opened:
+    """What is known of a capture once it is open.
+
+    Attributes
+    ----------
+    frames : int
+    sha256 : str
+        Of its content.
+    file : Path or None
+        Where it lies for other processes; None where they open it themselves.
+    changed : str
+        Why it is not the capture that the suite was frozen with; empty if it is.
+    """
+
+    frames: int = 0
+    sha256: str = ""
+    file: Path | None = None
+    changed: str = ""
+
+
+@dataclass(frozen=True)
+class Found:
+    """What a detector found on a capture.
+
+    Attributes
+    ----------
+    detections : Detections
+    candidates : Detections or None
+        Every peak before the filters.
+    """
+
+    detections: Detections
+    candidates: Detections | None
 
 
 @dataclass(frozen=True)
@@ -85,35 +124,53 @@ class Finished:
 _last: list[tuple[str, CaptureRef | RunRef, Capture | Drive]] = []
 
 
-def _opened(session: str, ref: CaptureRef | RunRef) -> Capture | Drive:
-    """Capture or run of a reference; the last one is kept, as the units of a capture follow each other."""
-    if not (_last and _last[0][:2] == (session, ref)):
-        _last[:] = [(session, ref, ref.open())]
+def _at_hand(job: Job, file: Path | None = None) -> Capture | Drive:
+    """Capture or run of a unit; the last one is kept, as the units of a capture follow each other.
+
+    Parameters
+    ----------
+    job : Job
+    file : Path, optional
+        Where another process has put it.
+    """
+    ref = job.unit.ref
+    if not (_last and _last[0][:2] == (job.session, ref)):
+        _last.clear()
+        _last.append((job.session, ref, ref.open() if file is None else taken(file)))
     return _last[0][2]
 
 
-_pipelines: dict[tuple[str, str], tuple[Pipeline | MappingPipeline, str]] = {}
+def opened(job: Job, file: Path | None = None) -> Opened:
+    """Open the capture of a unit, and keep it at hand for :func:`judged`.
+
+    Parameters
+    ----------
+    job : Job
+    file : Path, optional
+        Where to put it for other processes, if they would take as long to make it.
+    """
+    capture = _at_hand(job)
+    if job.frozen is not None and isinstance(capture, Capture):
+        try:
+            job.frozen.check(job.unit.dataset, job.unit.ref.name, capture)
+        except ChangedCapture as error:
+            return Opened(changed=str(error))
+    handed = file is not None and hand_over(capture, file)
+    return Opened(len(capture), capture.sha256, file if handed else None)
 
 
-def _checked(session: str, detector: DetectorConfig) -> tuple[Pipeline | MappingPipeline, str]:
-    """Pipeline of a detector with its identity, for which all sources are read; kept as long as the run lasts."""
+_pipelines: dict[tuple[str, str], Pipeline | MappingPipeline] = {}
+
+
+def _checked(session: str, detector: DetectorConfig) -> Pipeline | MappingPipeline:
+    """Pipeline of a detector; kept as long as the run lasts."""
     known = _pipelines.get((session, detector.name))
     if known is None:
         for old in [key for key in _pipelines if key[0] != session]:
             del _pipelines[old]
-        pipeline = Pipeline(detector) if detector.mapper is None else MappingPipeline(detector)
-        known = _pipelines[session, detector.name] = pipeline, pipeline.identity
+        known = Pipeline(detector) if detector.mapper is None else MappingPipeline(detector)
+        _pipelines[session, detector.name] = known
     return known
-
-
-def content_of(job: Job) -> str:
-    """SHA-256 of a unit's capture; empty where it cannot be opened."""
-    try:
-        return _opened(job.session, job.unit.ref).sha256
-    except BaseException as error:
-        if not by_plugin(error):
-            raise
-        return ""  # the unit itself will fail in the same way, and say so
 
 
 def die_with(parent: int) -> None:
@@ -131,37 +188,45 @@ def die_with(parent: int) -> None:
         threading.Thread(target=watch, name="watch-parent", daemon=True).start()
 
 
-def run_unit(job: Job) -> Finished:
-    """Detect and score on one capture with one thread."""
+def found(job: Job, file: Path | None = None) -> Found:
+    """What the detector of a unit finds on its capture, with one thread.
+
+    Parameters
+    ----------
+    job : Job
+    file : Path, optional
+        Where the capture lies, if :func:`opened` has put it there.
+    """
     from threadpoolctl import threadpool_limits
 
-    die_with(job.parent)
-    started = time.perf_counter()
-    unit = job.unit
-    try:
-        with threadpool_limits(1):
-            finished = _detected(job)
-    except BaseException as error:  # a plugin may raise anything; the other units still run
-        if not by_plugin(error) or isinstance(error, ChangedCapture):
-            raise
-        return Finished(entry_of(unit, "failed", reason=reason_of(error), traceback=traceback.format_exc()))
-    finished.entry.facts["elapsed_s"] = time.perf_counter() - started
-    return finished
+    with threadpool_limits(1):
+        capture = _at_hand(job, file)
+        detections = _detected(_checked(job.session, job.unit.detector), capture)
+        candidates = detections.candidates
+    return Found(_bare(detections), None if candidates is None else _bare(candidates))
 
 
-def _detected(job: Job) -> Finished:
-    unit = job.unit
-    capture = _opened(job.session, unit.ref)
-    if job.frozen is not None and isinstance(capture, Capture):
-        job.frozen.check(unit.dataset, unit.ref.name, capture)
-    stored, results = None, dict[str, Any]()
-    if unit.detector.results is None:
-        pipeline, identity = _checked(job.session, unit.detector)
-        detections = _found(pipeline, capture)
-    else:
+def judged(job: Job, message: bytes | None) -> Finished:
+    """Score what a detector has found, in a process that has not run it.
+
+    Parameters
+    ----------
+    job : Job
+    message : bytes or None
+        A :class:`Found` as the detector's process has packed it; None for what another program has found.
+    """
+    unit, capture = job.unit, _at_hand(job)
+    stored, results, identity = None, dict[str, Any](), job.identity
+    if message is None:
         stored, results = _read(unit, capture)
-        detections, identity = stored.detections, ResultsFolder(unit.detector).identity(stored.sha256)
-    header = capture.header
+        answer, identity = Found(stored.detections, None), ResultsFolder(unit.detector).identity(stored.sha256)
+    else:
+        answer = unpacked(message)
+        if not isinstance(answer, Found):
+            raise PluginError("the detector's process gave something else than detections")
+    detections, header = answer.detections, capture.header
+    if answer.candidates is not None:
+        detections = detections.annotated(candidates=answer.candidates)
     rows, curve = score_rows(detections, header, job.rules), None
     if scorable(rows):
         scene = Scene.of(detections, header)
@@ -188,11 +253,11 @@ def _detected(job: Job) -> Finished:
         scores=rows,
         facts=facts,
     )
-    kept = detections.candidates if any(rule.scoring in ("peak", "presence") for rule in job.rules) else None
+    keeps = any(rule.scoring in ("peak", "presence") for rule in job.rules)
     return Finished(
         entry=entry,
         found=_bare(detections),
-        candidates=None if kept is None else _bare(kept),
+        candidates=answer.candidates if keeps else None,
         header=header,
         sha256=capture.sha256,
         curve=curve,
@@ -200,7 +265,7 @@ def _detected(job: Job) -> Finished:
     )
 
 
-def _found(pipeline: Pipeline | MappingPipeline, capture: Capture | Drive) -> Detections:
+def _detected(pipeline: Pipeline | MappingPipeline, capture: Capture | Drive) -> Detections:
     """What a detector finds on a capture, or a mapper's on a run."""
     if isinstance(pipeline, MappingPipeline):
         assert isinstance(capture, Drive)  # noqa: S101 - planned so

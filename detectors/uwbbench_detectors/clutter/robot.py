@@ -65,11 +65,12 @@ class RobotTemplate(Stage[RobotTemplateParams]):
         """Block whose frames hold no robot."""
         frames = block.frames
         place_m, _ = places_m(self, frames)
+        valid = plain(frames.valid, np.bool_)
         parts = {}
         for place, name in enumerate(("preamble", "sts1", "sts2")):
             samples = getattr(frames, name)
             if samples is not None:
                 samples = plain(samples, np.complex64)
                 state = self.templates[place], self.carried[place]
-                parts[name] = plain(self._residuals(samples, frames.valid, place_m, *state, self.at), np.complex64)
+                parts[name] = plain(self._residuals(samples, valid, place_m, *state, self.at), np.complex64)
         return block.replace(frames=dataclasses.replace(frames, **parts))

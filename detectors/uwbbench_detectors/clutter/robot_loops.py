@@ -17,7 +17,7 @@ FRAMES = 4
 CARRIED = 5
 
 
-@inlined
+@compiled
 def without_robot(made: Any, template: Any, carried: FloatArray, at: FloatArray) -> None:
     """Subtract the template from an aligned response, then renew it if the robot has moved.
 

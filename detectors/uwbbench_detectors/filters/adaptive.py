@@ -22,10 +22,12 @@ from uwbbench.api import (
     ports,
 )
 from uwbbench_detectors.filters.false_alarms import prominence_factor, spread_factor
-from uwbbench_detectors.peaks.noise import rms
+from uwbbench_detectors.peaks.noise import rayleigh_rms, rms
 
 LEAST_HISTORY = 16
 """Frames from which on the floor at a delay is known well enough: at a rate of 1e-3 its spread costs 3 dB."""
+MEDIAN_WORTH = math.log(2) ** 2
+"""Taps of a mean square that one tap of a median is worth: its variance is ``1 / ln(2)^2`` as large."""
 REACH_PULSES = 1.5
 """Pulse lengths from the crest of an echo to the end of its main lobe."""
 
@@ -47,7 +49,10 @@ class AdaptiveFilterParams(Params):
         "delay too; from the noise until the robot has moved far enough.",
     )
     noise_taps: int | None = Field(
-        None, ge=1, description="Leading taps that the noise is measured on; null: the radar's noise_taps."
+        None,
+        ge=1,
+        description="Leading taps that the noise is measured on; null: the radar's noise_taps, and where it has none "
+        "the median of all taps.",
     )
     history_frames: int = Field(
         64, ge=LEAST_HISTORY, le=1024, description="Measured: earlier frames that the floor is taken from."
@@ -78,7 +83,8 @@ class AdaptiveFilter(Filter[AdaptiveFilterParams]):
     echoes fall with the distance it is too high far away; one of the score does not know how well four taps say what
     the noise is. Here the rate is stated, and the threshold follows.
 
-    * Against the noise, with ``s^2`` the mean square of the leading taps: the prominence, taken back from the scale of
+    * Against the noise, with ``s^2`` the mean square of the leading taps, or by the median as in ``noise_floor``: the
+      prominence, taken back from the scale of
       the profile to that of the samples, is at least ``sqrt(c) s``. The factor c is that of
       :func:`uwbbench_detectors.filters.false_alarms.prominence_factor`, with the spread of s and the extremes of
       the profile in it. A ripple of noise on the flank of a strong pulse has no more prominence than noise elsewhere.
@@ -87,7 +93,7 @@ class AdaptiveFilter(Filter[AdaptiveFilterParams]):
       The rate holds at each delay, however the floor decays, where it is diffuse; ringing that is the same in all
       frames passes less often. As an echo reaches its crest at a delay when the robot has moved for half its length,
       the frames of the last ``1.5 c / (2 B)`` of way are left out, B the bandwidth: what arrives does not hide itself.
-      What keeps its delay over the way that the history is long, such as a wall that the robot drives along, does.
+      What keeps its delay for more than a quarter of the history, such as a wall that the robot drives along, does.
     * Against the law of distance: ``A >= A_direct 10^(least_echo_db / 20) (1 m / R)^(1 or 2)``, with R half the way of
       the delay.
 
@@ -100,7 +106,7 @@ class AdaptiveFilter(Filter[AdaptiveFilterParams]):
     Raises
     ------
     ConfigError
-        From ``open``, if there are no taps to measure the noise on.
+        From ``open``, if all taps of a frame are to be noise.
     """
 
     consumes: ClassVar[frozenset[str]] = ports(
@@ -114,11 +120,12 @@ class AdaptiveFilter(Filter[AdaptiveFilterParams]):
         super().open(radar)
         p = self.params
         self._noise_taps = p.noise_taps or radar.noise_taps
-        if not 0 < self._noise_taps < radar.taps:
+        if self._noise_taps >= radar.taps:
             raise ConfigError(
-                f"filter.adaptive: the noise is measured on {self._noise_taps} leading taps of {radar.taps}; give "
-                "'noise_taps', for a radar without taps before the first arrival too"
+                f"filter.adaptive: the noise is measured on {self._noise_taps} leading taps of {radar.taps}, which "
+                "leaves none; lower 'noise_taps'"
             )
+        self._independent = self._noise_taps or MEDIAN_WORTH * radar.taps
         pulse_m = SPEED_OF_LIGHT_M_S / (2 * radar.bandwidth_hz)
         self._guard = math.ceil(REACH_PULSES * pulse_m / p.spacing_m)
         self._past: FloatArray = np.empty((p.history_frames + self._guard, radar.taps))
@@ -139,16 +146,16 @@ class AdaptiveFilter(Filter[AdaptiveFilterParams]):
     def _above_floor(self, block: Block, row: IntArray, path: FloatArray) -> BoolArray:
         """Peaks (n,) above the noise, or above the floor that is known in their frame."""
         found = block.detections
-        noise = rms(block.frames.amplitude[:, : self._noise_taps])[row]
+        amplitude, leading = block.frames.amplitude, self._noise_taps
+        noise = (rms(amplitude[:, :leading]) if leading else rayleigh_rms(amplitude))[row]
         if len(row) and not (noise > 0).all():
             self.note(
-                "filter.adaptive: the taps before any arrival are zero in some frames; no rate could be held there, "
-                "and nothing passes"
+                "filter.adaptive: the noise is zero in some frames; no rate could be held there, and nothing passes"
             )
         taps = block.part("profile").shape[1]
         kept = np.zeros(len(row), bool)
         if len(row):
-            factor = prominence_factor(self.params.false_alarm_rate, taps, self._noise_taps)
+            factor = prominence_factor(self.params.false_alarm_rate, taps, self._independent)
             prominence = found["prominence"] * _scale(block)[row]
             kept = (noise > 0) & (prominence >= np.sqrt(factor) * noise)
         if self.params.floor == "noise":

@@ -83,7 +83,7 @@ def spread_factor(false_alarm_rate: float, frames: int, lower: int, upper: int) 
 
 
 @lru_cache(maxsize=256)
-def prominence_factor(false_alarm_rate: float, taps: int, noise_taps: int) -> float:
+def prominence_factor(false_alarm_rate: float, taps: int, noise_taps: float) -> float:
     """Factor on the mean square of a few taps of noise that a squared prominence is compared with.
 
     The base of a peak is the higher of the smallest values on its two sides, and the smallest of n Rayleigh values is
@@ -106,8 +106,8 @@ def prominence_factor(false_alarm_rate: float, taps: int, noise_taps: int) -> fl
         Share of taps, less than a third.
     taps : int
         Of the profile.
-    noise_taps : int
-        Taps that the mean square is taken over, m.
+    noise_taps : float
+        Taps that the mean square is taken over, m, or as many as would know it as well.
 
     Returns
     -------

@@ -8,6 +8,7 @@ import numpy as np
 from pydantic import Field
 
 from uwbbench.api import Block, BoolArray, Filter, FloatArray, Params, Radar, ports
+from uwbbench_detectors.integrate.motion import plain
 
 
 class SidelobeParams(Params):
@@ -62,6 +63,6 @@ class SidelobeFilter(Filter[SidelobeParams]):
         """Mask of the detections that can be no side lobe."""
         rows = block.detections
         cosine, spread = rows["motion_cosine"], rows["motion_cosine_sd"]
-        columns = [np.ascontiguousarray(values) for values in (rows["tap"], rows["score_db"], cosine, spread)]
-        kept: BoolArray = self._unmasked(np.ascontiguousarray(rows.frame), *columns, self.at)
+        columns = [plain(values, np.float64) for values in (rows["tap"], rows["score_db"], cosine, spread)]
+        kept: BoolArray = self._unmasked(plain(rows.frame, np.int64), *columns, self.at)
         return kept

@@ -8,7 +8,7 @@ from typing import ClassVar, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from uwbbench.api import Block, BoolArray, ConfigError, Filter, Limit, LimitFilter, Params, Radar, ports
+from uwbbench.api import Block, BoolArray, Filter, Limit, LimitFilter, Params, Radar, ports
 
 
 def _check_order(minimum: float | None, maximum: float | None, unit: str) -> None:
@@ -214,10 +214,7 @@ class ReflectionFilter(Filter[ReflectionFilterParams]):
     ``20 log10(2 r A / D)`` is its reflection in decibels, plus the isolation between the antennas. Needs frames that
     are scaled to the direct path, as by ``align.template``.
 
-    Raises
-    ------
-    ConfigError
-        From ``open``, where transmitter and receiver are in one place.
+    Where transmitter and receiver are in one place all detections pass, with a note.
     """
 
     consumes: ClassVar[frozenset[str]] = ports("detections", "amplitude", "range_m")
@@ -226,7 +223,7 @@ class ReflectionFilter(Filter[ReflectionFilterParams]):
         """Look up the baseline."""
         super().open(radar)
         if radar.baseline_length_m == 0:
-            raise ConfigError("filter.reflection: needs a direct path: transmitter and receiver are in one place")
+            self.note("filter.reflection left out: transmitter and receiver are in one place, and no baseline scales it")
         self.least = radar.baseline_length_m / 2 * 10 ** (self.params.minimum_db / 20)
 
     def keep(self, block: Block) -> BoolArray:

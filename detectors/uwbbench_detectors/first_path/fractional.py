@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from uwbbench.api import inlined
+from uwbbench.api import compiled, inlined
 
 Float32Array = NDArray[np.float32]
 
@@ -43,7 +43,7 @@ def between_table() -> Float32Array:
     return np.asarray(table / table.sum(axis=1, keepdims=True), np.float32)
 
 
-@inlined
+@compiled
 def moved(padded: Any, tap: float, table: Any, start: int, stop: int, made: Any) -> None:
     """Samples of a response moved so that what was at ``tap`` comes to tap 0.
 

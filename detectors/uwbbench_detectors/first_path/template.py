@@ -107,6 +107,7 @@ class AlignTemplate(Stage[AlignTemplateParams]):
             zero = np.full(len(frames), -first_tap_s / self.radar.sample_interval_s)
             return block.replace(first_path=zero)
         place_m, _ = places_m(self, frames)
+        valid = plain(frames.valid, np.bool_)
         parts, refused = {}, False
         for place, name in enumerate(("preamble", "sts1", "sts2")):
             samples = getattr(frames, name)
@@ -115,7 +116,7 @@ class AlignTemplate(Stage[AlignTemplateParams]):
             clear = np.empty(len(frames), bool)
             samples = plain(samples, np.complex64)
             made = self._align(
-                samples, frames.valid, place_m, self.templates[place], self.carried[place], self.at, self.table, clear
+                samples, valid, place_m, self.templates[place], self.carried[place], self.at, self.table, clear
             )
             parts[name] = plain(made, np.complex64)
             refused |= not clear[frames.valid].all()

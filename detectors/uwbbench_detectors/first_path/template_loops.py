@@ -29,7 +29,7 @@ LEAST = 1e-36
 """Magnitude below which a single-precision frame is empty: its square and its reciprocal are no numbers any more."""
 
 
-@inlined
+@compiled
 def refined(padded: Any, tap: float, rounds: int, table: Any) -> float:
     """Crest near a tap, by parabolas through logarithms on steps of 1/2, 1/5 and 2/25 tap.
 
@@ -180,7 +180,7 @@ def align_response(
             moved(padded, tap - to_tap, table, start, stop, made)
             shift, _, _ = fitted(made, template, start, stop)
             tap -= max(-LARGEST_STEP, min(LARGEST_STEP, shift))
-    moved(padded, tap - to_tap, table, 0, taps, made)
+    moved(padded, tap - to_tap, table, min(start, 0), taps, made)
     gain_r, gain_i = float(made[0, aim]), float(made[1, aim])
     if settled:
         gain_r = gain_i = size = 0.0

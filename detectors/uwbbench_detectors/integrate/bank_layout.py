@@ -18,5 +18,5 @@ COLUMNS = 9
 NAMES = ("tap", "amplitude", "score_db", "motion_cosine", "motion_cosine_sd", "motion_rad", "held", "pdoa_rad")
 """Columns of the rows behind their frame; the last only where there is a second channel."""
 
-MOST = 32
+MOST = 64
 """Rows of a frame."""

@@ -39,5 +39,5 @@ class FuseResponses(Stage[Params]):
         """Block whose preamble is the sum."""
         frames = block.frames
         preamble, sts1 = plain(frames.preamble, np.complex64), plain(frames.sts1, np.complex64)
-        made = self._fused(preamble, sts1, frames.valid, self.noise)
+        made = self._fused(preamble, sts1, plain(frames.valid, np.bool_), self.noise)
         return block.replace(frames=frames.with_preamble(plain(made, np.complex64)))

@@ -47,7 +47,7 @@ def noise_power(made: Any, noise: FloatArray) -> float:
     return noise[POWER]
 
 
-@inlined
+@compiled
 def weighted(preamble: Any, sts1: Any, noise: FloatArray) -> None:
     """Sum of two responses in which each echo has the amplitude it had, and the noise is least.
 

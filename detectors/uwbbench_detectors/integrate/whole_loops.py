@@ -238,7 +238,7 @@ def whole_frames(
                 found[row, fixed.DETECTED_DB] = left[row, lay.SCORE_DB]
                 found[row, fixed.DETECTED_HELD] = left[row, lay.HELD]
             count = followed(
-                objects, fixed_carried, found, 0, count, place_m[frame], yaw_rad[frame], at_fixed, rows
+                objects, fixed_carried, found[:count], place_m[frame], yaw_rad[frame], at_fixed, rows
             )
         if written + count > len(table):
             larger = np.empty((2 * len(table), width))

@@ -46,7 +46,7 @@ class DopplerPhase(Stage[DopplerPhaseParams]):
 
         ``((cos(az_m - psi) - u) / s_u)^2 + (wrap(phase - (2 pi s / lambda) sin(az)) / s_p)^2 + behind``,
 
-    ``s_u^2 = cosine_sd^2 + motion_cosine_sd^2``, ``s_p^2 = phase_sd^2 + 1 / SNR``; over a grid of 3 degrees and a
+    ``s_u^2 = cosine_sd^2 + motion_cosine_sd^2``, ``s_p^2 = phase_sd^2 + 1 / SNR``; over a grid of 5 degrees and a
     parabola through the costs. Doppler is seen from the middle ``m`` of transmitter and receiver, ``az_m``, the phase
     from the receiver, ``az``: a target at half the path away from the middle lies at ``m + (d / 2) (cos az_m, sin
     az_m)`` from the receiver. For targets near the robot they differ by up to 20 degrees.

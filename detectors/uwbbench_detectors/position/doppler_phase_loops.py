@@ -12,8 +12,8 @@ from uwbbench_detectors.position.wrap import wrapped
 SLOPE, MIDDLE_X, MIDDLE_Y, TAP_M, BASELINE_M, COSINE_SD, PHASE_SD, LOOSE_SD, BEHIND = range(9)
 SETTINGS = 9
 """Settings, by their places."""
-STEPS = 120
-"""Directions of the search: 3 degrees apart, a fraction of what either measurement resolves."""
+STEPS = 72
+"""Directions of the search: 5 degrees apart, which both measurements resolve at best."""
 NEAREST_M = 0.05
 """Least distance from the middle of the antennas that directions are converted for."""
 

@@ -62,7 +62,8 @@ class Pdoa(Stage[PdoaParams]):
     Raises
     ------
     ConfigError
-        For a reference other than ``none``, if the radar has no antenna spacing, or its transmitter stands at the receiver and
+        For a reference other than ``none``, if the radar has no antenna spacing, or its transmitter stands at the
+        receiver and
         the direct path has no direction.
 
     References
@@ -79,7 +80,7 @@ class Pdoa(Stage[PdoaParams]):
     def open(self, radar: Radar) -> None:
         """Work out the phase difference that the direct path should have."""
         super().open(radar)
-        self._expected_rad = 0.0 if self.params.reference == "none" else _direct_path_pdoa(radar, self.params.reference)
+        self.expected_rad = 0.0 if self.params.reference == "none" else _direct_path_pdoa(radar, self.params.reference)
 
     def step(self, block: Block) -> Block:
         """Block whose detections carry ``pdoa_rad``."""
@@ -87,7 +88,7 @@ class Pdoa(Stage[PdoaParams]):
         alpha = self._difference(block.frames, rows, block.detections["tap"])
         if self.params.reference == "direct":
             alpha = alpha - self._difference(block.frames, rows, block.part("first_path")[rows])
-        alpha = alpha + self._expected_rad
+        alpha = alpha + self.expected_rad
         wrapped = wrap_angle(alpha) if self.params.wrap == "half_open" else -wrap_angle(-alpha)
         return block.with_columns(pdoa_rad=wrapped)
 
@@ -144,7 +145,7 @@ def _direct_path_pdoa(radar: Radar, reference: str) -> float:
     distance_m = radar.baseline_length_m
     if distance_m == 0:
         raise ConfigError(
-            f"pdoa: reference '{reference}' needs a transmitter apart from receiver '{radar.receiver}': without a baseline "
-            "the direct path has no direction"
+            f"pdoa: reference '{reference}' needs a transmitter apart from receiver '{radar.receiver}': without a "
+            "baseline the direct path has no direction"
         )
     return float(2 * np.pi * radar.array_spacing_m / radar.wavelength_m * radar.baseline_m[1] / distance_m)

@@ -9,7 +9,7 @@ import numpy as np
 from uwbbench.api import compiled, inlined
 
 
-@inlined
+@compiled
 def matched(made: Any, pulse: Any, room: Any) -> None:
     """Filter a response by a pulse that is symmetric in time.
 

@@ -131,6 +131,22 @@ def test_direct_reference_cancels_a_common_phase_and_restores_the_direct_paths_g
     np.testing.assert_allclose(found["pdoa_rad"], true, atol=1e-12)
 
 
+def test_responses_relative_to_their_direct_paths_get_its_geometry_back(make_block, make_stage, run_stage, make_radar):
+    """Dividing both responses by their direct paths takes off what 'direct' measures there."""
+    rng = np.random.default_rng(7)
+    sts1, sts2 = two_antennas(rng, 3)
+    radar = make_radar(TAPS, array_spacing_m=SPACING_M, tx_position_m=(-0.2, 0.15, 0.0))
+    aligned = [samples / samples[:, 5:6] for samples in (sts1, sts2)]
+    found = [
+        run_stage(make_stage("pdoa", sample="same_tap", reference=reference), radar, block).detections["pdoa_rad"]
+        for reference, block in (
+            ("direct", block_of(make_block, sts1, sts2, [6.0, 9.0, 12.0])),
+            ("aligned", block_of(make_block, *aligned, [6.0, 9.0, 12.0])),
+        )
+    ]
+    assert np.exp(1j * found[0]) == pytest.approx(np.exp(1j * found[1]))
+
+
 @pytest.mark.parametrize(
     ("known", "missing"),
     [({"tx_position_m": (0.0, -0.2, 0.0)}, "antenna spacing"), ({"array_spacing_m": SPACING_M}, "baseline")],

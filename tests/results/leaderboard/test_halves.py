@@ -29,7 +29,7 @@ Oracle = load_plugin("stages", "reference.oracle")
 
 
 class Learned(Stage[Params]):
-    """Knows the truth of the captures that it has learned by heart, and does not say so."""
+    """Knows the truth of the captures that it has learned by heart, in this process, and does not say so."""
 
     heart: Mapping[bytes, Capture] = {}
     produces = Oracle.produces
@@ -60,7 +60,10 @@ def runs(tmp_path_factory: pytest.TempPathFactory):
         captures = [ref.open() for ref in dataset.references()]
         Learned.heart = {capture.frames(0, 1).preamble[0].tobytes(): capture for capture in captures}
         private = read_experiment(folder / "suite.yaml", seeds=folder / "seeds")
-        yield [run_experiment(one, folder / name, jobs=1).path for name, one in (("open", public), ("own", private))]
+        yield [
+            run_experiment(one, folder / name, isolated=False).path
+            for name, one in (("open", public), ("own", private))
+        ]
     finally:
         del registry._registered["stages", "learned"]
         registry.entries.cache_clear()

@@ -14,10 +14,10 @@ from pathlib import Path
 from typing import Any
 
 from uwbbench.run.folder.files import replacing, write_json, write_text
+from uwbbench.show import drawing
 from uwbbench.show.charts import scene_charts
 from uwbbench.show.charts.chart import Spec
 from uwbbench.show.charts.theme import PAGE, PRINT
-from uwbbench.show.extras import report_tools
 from uwbbench.show.html.cell import Table, table_of
 from uwbbench.show.html.render import badge, document, embedded, packed
 from uwbbench.show.page.content import Content
@@ -34,7 +34,7 @@ def page(content: Content) -> str:
     Raises
     ------
     ReportToolsError
-        If Jinja2 or vl-convert is not installed.
+        If Jinja2 or vl-convert is not installed, or charts cannot be drawn here.
     """
     report = content.report
     manifest = report.folder.manifest
@@ -110,16 +110,14 @@ def write_figures(content: Content, folder: Path) -> list[Path]:
     StoreError
         If a file cannot be written.
     """
-    with report_tools():
-        import vl_convert
     written = []
     for picture in pictures(content):
         spec = {**picture.spec, "width": FIGURE_WIDTH, "config": {**PRINT, "background": "white"}}
         write_json(folder / f"{picture.name}.vl.json", spec)
-        drawn = vl_convert.vegalite_to_svg(spec)
+        drawn = drawing.svg(spec)
         write_text(folder / f"{picture.name}.svg", drawn)
         with replacing(folder / f"{picture.name}.png") as partial:
-            partial.write_bytes(vl_convert.svg_to_png(drawn, scale=2))
+            partial.write_bytes(drawing.png(drawn))
         written.append(folder / f"{picture.name}.png")
     write_json(folder / INDEX, {"generator": MARK, "figures": [path.name for path in written]})
     return written
@@ -128,10 +126,7 @@ def write_figures(content: Content, folder: Path) -> list[Path]:
 @lru_cache(maxsize=1)
 def _bundle() -> str:
     """Script of the charts; it must not hold what would end its element."""
-    with report_tools():
-        import vl_convert
-    script: str = vl_convert.javascript_bundle()  # type: ignore[call-arg]  # its stub knows no default
-    return script.replace("</script", "<\\/script").replace("<!--", "<\\!--")
+    return drawing.script().replace("</script", "<\\/script").replace("<!--", "<\\!--")
 
 
 def _without_hashes(manifest: Mapping[str, Any]) -> dict[str, Any]:

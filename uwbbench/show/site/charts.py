@@ -11,10 +11,10 @@ from uwbbench.results.curves import error_curve
 from uwbbench.results.leaderboard.ranking import SETTINGS, Ranking
 from uwbbench.results.pareto import points
 from uwbbench.run.folder.identity import digest
+from uwbbench.show import drawing
 from uwbbench.show.charts import error_charts, speed_chart
 from uwbbench.show.charts.chart import Spec
 from uwbbench.show.charts.theme import PAGE
-from uwbbench.show.extras import report_tools
 from uwbbench.show.text.quantity import Quantity
 from uwbbench.show.text.sheet import shown
 
@@ -71,10 +71,8 @@ def svg(spec: Spec) -> str:
     ReportToolsError
         If vl-convert is not installed.
     """
-    with report_tools():
-        import vl_convert
     complete: dict[str, Any] = {**spec, "width": WIDTH, "config": PAGE}
-    drawn: str = vl_convert.vegalite_to_svg(complete)
+    drawn: str = drawing.svg(complete)
     plain = re.sub(r' (?:role|aria-[a-z]+)="[^"<>]*"', "", drawn)
     # vl-convert counts clips through its whole life; on a page they must be distinct, and the same every time.
     chart, places = digest(spec)[:8], dict[str, int]()
