@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: test test-slow lint bench demo docs pictures leaderboard leaderboard-check clean
+.PHONY: test test-slow fuzz lint bench demo docs pictures leaderboard leaderboard-check clean
 .DELETE_ON_ERROR:
 
 $(VENV)/ready: pyproject.toml
@@ -25,6 +25,12 @@ test: $(VENV)/ready
 # What takes longer: pages in a real browser, examples of the documentation, packages installed by pip.
 test-slow: $(VENV)/ready
 	$(PYTEST) -m "slow or browser"
+
+# Damaged copies of every format that is read, so many of each: an hour and a half or so. New ones each time; what it
+# prints first repeats them.
+FLIPS ?= 20000
+fuzz: $(VENV)/ready
+	$(BIN)/python -m tests.fuzz.run $(FLIPS)
 
 lint: $(VENV)/ready
 	$(BIN)/ruff format --check .

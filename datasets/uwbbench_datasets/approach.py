@@ -41,6 +41,7 @@ BASELINE_M = 0.25
 ARRAY_SPACING_M = 17.8e-3
 ISOLATION_DB, RINGING_DB, RINGING_DECAY_S = 6.0, -9.0, 1.5e-9
 DIRECT_SNR_DB, STS_LOSS_DB = 45.0, 4.0
+MOST_FRAMES = 1_000_000
 WIDTH_M, HEIGHT_M, THICKNESS_M = 0.25, 0.28, 0.02
 
 
@@ -91,7 +92,10 @@ class Approach(Dataset[ApproachParams]):
             raise CaptureError(f"no simulated run '{name}'.{nearest(name, names)}")
         p = self.params
         rng = np.random.default_rng([p.seed, names.index(name)])
-        frames = int(abs(p.start_m - p.stop_m) / p.speed_m_s * p.frame_rate_hz) + 1
+        spaces = abs(p.start_m - p.stop_m) / p.speed_m_s * p.frame_rate_hz
+        if not spaces < MOST_FRAMES:
+            raise CaptureError(f"an approach of {spaces:.3g} frames; it may have {MOST_FRAMES}")
+        frames = int(spaces) + 1
         distance_m = np.linspace(p.start_m, p.stop_m, frames)
         position_m = np.stack([p.start_m - distance_m, np.zeros(frames), np.zeros(frames)], axis=1)
         truth = Truth((self._plate(),))

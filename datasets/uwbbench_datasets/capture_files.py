@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import glob
 from collections.abc import Iterable, Sequence
 from functools import cached_property
 from pathlib import Path
@@ -11,6 +10,7 @@ from typing import ClassVar
 from pydantic import Field
 
 from uwbbench.api import Capture, CaptureError, Card, Dataset, Params, list_receivers, nearest, open_capture
+from uwbbench_datasets.matching import matching_files
 
 
 def find_files(patterns: Iterable[str], folders: Sequence[Path]) -> list[Path]:
@@ -35,6 +35,8 @@ def find_files(patterns: Iterable[str], folders: Sequence[Path]) -> list[Path]:
     """
     paths: dict[Path, None] = {}
     for pattern in patterns:
+        if "\0" in pattern:
+            raise CaptureError(f"{pattern!r} names no file: it holds a NUL character")
         wanted = Path(pattern).expanduser()
         places = [Path()] if wanted.is_absolute() else folders
         matches = next((hits for folder in places if (hits := _matches(folder, wanted))), [])
@@ -48,8 +50,7 @@ def find_files(patterns: Iterable[str], folders: Sequence[Path]) -> list[Path]:
 def _matches(folder: Path, wanted: Path) -> list[Path]:
     if (folder / wanted).is_file():  # also a name that happens to hold glob characters
         return [(folder / wanted).resolve()]
-    hits = sorted(glob.glob(str(wanted), root_dir=folder, recursive=True))  # noqa: PTH207 - passes over hidden files
-    return [(folder / hit).resolve() for hit in hits if (folder / hit).is_file()]
+    return [(folder / hit).resolve() for hit in matching_files(folder, str(wanted))]
 
 
 def short_names(files: Sequence[Path]) -> dict[str, Path]:

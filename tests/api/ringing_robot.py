@@ -21,7 +21,7 @@ def tailed(time_s):
     return whole(time_s + crest_s) / whole(crest_s)
 
 
-def frames_of(pulse=gauss, echo=0.05, frames=200, noise=3e-4, seed=0):
+def frames_of(pulse=gauss, echo=0.05, frames=100, noise=3e-4, seed=0):
     """Frames (frames, 50) whose direct path has its own crest at tap 7 and a fraction, that fraction, and the echo.
 
     Each frame has a phase of its own; the echo recedes from tap 16 to 36 and turns.

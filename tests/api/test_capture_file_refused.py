@@ -12,6 +12,12 @@ from tests.api.written import capture_of
 from uwbbench.api import CaptureError, open_capture, write_capture
 
 
+@pytest.fixture(autouse=True)
+def here(monkeypatch):
+    """Files are read here; tests/fuzz is about the child that reads them first."""
+    monkeypatch.setenv("UWBBENCH_TRUST_FILES", "1")
+
+
 @pytest.fixture
 def path(tmp_path):
     """A correct file, to be spoilt."""
@@ -199,3 +205,22 @@ def test_a_missing_file_and_a_folder_are_refused(tmp_path):
 def test_an_unknown_receiver_suggests_the_nearest(path):
     with pytest.raises(CaptureError, match=r"no receiver 'frond'\. Did you mean 'front'"):
         open_capture(path, "frond")
+
+
+@pytest.mark.parametrize("value", ["x" * 40_000, "x y " * 10_000, np.arange(5000.0), np.full(5, 1e308)])
+@pytest.mark.parametrize("attribute", ["sample_interval_s", "samples", "channel"])
+def test_a_message_repeats_at_most_200_characters_of_an_attribute(path, attribute, value):
+    with h5py.File(path, "a") as file:
+        file["radar"].attrs[attribute] = value
+    with pytest.raises(CaptureError, match=f"/radar@{attribute}: expected") as caught:
+        open_capture(path)
+    assert len(str(caught.value).removeprefix(str(path))) < 300
+
+
+@pytest.mark.parametrize("value", [1e308, 2**62, 5e-324])
+@pytest.mark.parametrize("attribute", ["sample_interval_s", "frame_rate_hz", "bandwidth_hz", "center_frequency_hz"])
+def test_a_number_that_nothing_can_be_multiplied_with_is_refused(path, attribute, value):
+    with h5py.File(path, "a") as file:
+        file["radar"].attrs[attribute] = value
+    with pytest.raises(CaptureError, match=f"radar {attribute} must lie between"):
+        open_capture(path)

@@ -118,3 +118,44 @@ def test_a_missing_file_a_folder_and_bytes_that_are_no_text_are_refused_by_name(
     for name in ("none.yaml", ".", "bytes.yaml"):
         with pytest.raises(ConfigError, match=r"cannot be read|UTF-8"):
             read_yaml(tmp_path / name)
+
+
+def test_a_file_that_is_too_long_is_refused_before_it_is_parsed(tmp_path):
+    (tmp_path / "long.yaml").write_text("a: [" + "x, " * 400_000 + "]")
+    with pytest.raises(ConfigError, match=r"long\.yaml: is longer than 256 KiB"):
+        read_yaml(tmp_path / "long.yaml")
+
+
+def test_a_device_is_not_read(tmp_path):
+    (tmp_path / "endless.yaml").symlink_to("/dev/zero")
+    with pytest.raises(ConfigError, match=r"endless\.yaml: cannot be read: is no file"):
+        read_yaml(tmp_path / "endless.yaml")
+
+
+@pytest.mark.parametrize("number", ["0x" + "f" * 100_000, "9" * 100_000, "-" + "9" * 5000])
+def test_a_number_of_thousands_of_digits_is_one_short_message(number):
+    with pytest.raises(ConfigError, match=r"^f\.yaml:1: '.*\.\.\.' is not a valid int") as caught:
+        parse_yaml(f"seed: {number}", "f.yaml")
+    assert len(str(caught.value)) < 300
+
+
+@pytest.mark.parametrize("value", ["x" * 100_000, "'" + "x y " * 30_000 + "'", "[" + "a, " * 3_000 + "]"])
+def test_a_message_repeats_at_most_200_characters_of_a_value(value):
+    from uwbbench.api import Params, checked
+
+    class Some(Params):
+        length_m: float
+
+    source = parse_yaml(f"length_m: {value}", "f.yaml")
+    with pytest.raises(ConfigError, match=r"^f\.yaml:1: length_m: ") as caught:
+        checked(Some, source.data, source)
+    assert len(str(caught.value)) < 300
+
+
+def test_an_unknown_key_of_any_length_is_one_short_message():
+    from uwbbench.api import Params, checked
+
+    source = parse_yaml(f"{'k' * 1000}: 1", "f.yaml")
+    with pytest.raises(ConfigError, match="unknown key") as caught:
+        checked(Params, source.data, source)
+    assert len(str(caught.value)) < 800

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import argparse
 import hashlib
+import inspect
 import json
 import os
 import sys
@@ -121,6 +122,7 @@ def counted(detector: Pipeline, unit: Unit, gate_m: float) -> Row:
         "fp": fp.tolist(),
         "fn": (asked - tp).tolist(),
         "materials": {name: [found_of[name], asked_of[name]] for name in sorted(asked_of)},
+        "chance": verdict.chance_recall * int(asked.sum()) if asked.sum() else 0.0,
         "kinds": dict(causes(found, scene, rules, "filtering").false),
         "errors": [float(error_m.sum()), float(np.abs(error_m).sum()), float((error_m**2).sum()), len(error_m)],
     }
@@ -173,7 +175,8 @@ def gathered(every: Sequence[Unit], detectors: Sequence[str], cache: Path, proce
     gate_m : float
     """
     cache.mkdir(parents=True, exist_ok=True)
-    scoring = source_hash("uwbbench.measure.accuracy.causes") + hashlib.sha256(Path(__file__).read_bytes()).hexdigest()
+    counting = "".join(map(inspect.getsource, (motions, counted)))
+    scoring = source_hash("uwbbench.measure.accuracy.causes") + hashlib.sha256(counting.encode()).hexdigest()
     identities = {name: load_detector(name).identity for name in detectors}
     hashes = {file: hashlib.sha256(file.read_bytes()).hexdigest() for file in {unit.file for unit in every}}
     places = {
@@ -242,6 +245,7 @@ def summary(detector: str, generator: str, rows: Sequence[tuple[str, Row]]) -> R
         "captures": len(rows),
         "precision": precision,
         "recall": recall,
+        "chance_recall": sum(row["chance"] for _, row in rows) / max(int((counts["tp"] + counts["fn"]).sum()), 1),
         "f1": f1,
         "f1_low": low,
         "f1_high": high,
@@ -257,26 +261,13 @@ def summary(detector: str, generator: str, rows: Sequence[tuple[str, Row]]) -> R
 
 def lines(summaries: Sequence[Row]) -> Iterator[str]:
     """The tables as Markdown."""
-    columns = [
-        "detector",
-        "generator",
-        "n",
-        "P",
-        "R",
-        "F1",
-        "95 %",
-        "worst",
-        *MOTIONS,
-        "recall of",
-        "bias",
-        "SD",
-        "MAE",
-    ]
+    columns = ["detector", "generator", "n", "P", "R", "(chance)", "F1", "95 %", "worst", *MOTIONS]
+    columns += ["recall of", "bias", "SD", "MAE"]
     yield "| " + " | ".join([*columns, "false detections"]) + " |"
     yield "|" + " --- |" * (len(columns) + 1)
     for one in summaries:
         parts = [one["detector"], one["generator"], str(one["captures"])]
-        parts += [f"{one[name]:.3f}" for name in ("precision", "recall", "f1")]
+        parts += [f"{one[name]:.3f}" for name in ("precision", "recall", "chance_recall", "f1")]
         parts += [f"{one['f1_low']:.2f}-{one['f1_high']:.2f}", f"{one['f1_worst']:.2f}"]
         parts += ["/".join(f"{number:.2f}" for number in one["motion"][name]) for name in MOTIONS]
         parts += [", ".join(f"{name} {number:.2f}" for name, number in one["recall_of"].items())]
@@ -284,7 +275,8 @@ def lines(summaries: Sequence[Row]) -> Iterator[str]:
         parts += [", ".join(f"{kind} {count}" for kind, count in one["kinds"].items())]
         yield "| " + " | ".join(parts) + " |"
     yield ""
-    yield "P/R/F1 in the columns of motion; bias, SD and MAE of true detections in cm; worst: F1 of the worst capture."
+    yield "(chance): recall of as many random ranges. Columns of motion: P/R/F1. Worst: F1 of the worst capture."
+    yield "Bias, SD and MAE of true detections in cm."
 
 
 def main() -> int:

@@ -149,10 +149,11 @@ def test_progress_is_shown_on_a_terminal_and_stdout_stays_pure(experiment: Path,
 
 
 @pytest.mark.slow
-def test_interrupting_a_run_keeps_what_is_finished(experiment: Path, capture: Path, tmp_path: Path) -> None:
+@pytest.mark.parametrize("jobs", ["1", "2"])
+def test_interrupting_a_run_keeps_what_is_finished(experiment: Path, capture: Path, tmp_path: Path, jobs: str) -> None:
     for copy in range(20):
         (tmp_path / f"copy-{copy}.h5").write_bytes(capture.read_bytes())
-    command = [sys.executable, "-m", "uwbbench.cli", "run", "small.yaml", "--jobs", "1", "--out", "first"]
+    command = [sys.executable, "-m", "uwbbench.cli", "run", "small.yaml", "--jobs", jobs, "--out", "first"]
     running = subprocess.Popen(
         command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
     )
@@ -164,4 +165,5 @@ def test_interrupting_a_run_keeps_what_is_finished(experiment: Path, capture: Pa
     assert running.returncode == 130
     assert "continue with --resume first" in message
     assert "Traceback" not in message
+    assert "Warning" not in message
     assert json.loads(journal.read_text().splitlines()[0])["status"] == "done"

@@ -7,6 +7,7 @@ Fourier sum. Objects, ways, robot and radio are drawn from a seed.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -84,13 +85,17 @@ def drawn(rng: np.random.Generator) -> Room:
         if len(outlines) < len(materials) or legs.min() < 0.8 or legs.max() > 4:
             continue
         halts = {int(leg): float(rng.uniform(1.5, 4)) for leg in rng.choice(np.arange(1, 6), 2, replace=False)}
-        poses = steered(points, rng.uniform(0.2, 0.45), np.radians(rng.uniform(40, 100)), halts, RATE_HZ)
+        speed, turn = rng.uniform(0.2, 0.45), np.radians(rng.uniform(40, 100))
         rough = [rng.uniform(2e-3, 8e-3) for _ in outlines]
         cuts = [
             cut(outline, REFLECTION[m], i, r, rng)
             for i, (outline, m, r) in enumerate(zip(outlines, materials, rough, strict=True))
         ]
         facets = Facets(*(np.concatenate([getattr(c, name) for c in cuts]) for name in cuts[0].__dataclass_fields__))
+        straight = np.concatenate([np.linspace(*leg, 40) for leg in pairwise(points)])
+        if np.min(np.linalg.norm(straight[:, None] - facets.center_m, axis=2)) < 0.15:
+            continue  # steering takes a while, and would not save it
+        poses = steered(points, speed, turn, halts, RATE_HZ)
         near = min(np.min(np.linalg.norm(p[:2] - facets.center_m, axis=1)) for p in poses[::5])
         if near > 0.4 and np.all(np.abs(poses[:, :2]) < half - 0.3):
             return Room(half, outlines, [str(one) for one in materials], facets, poses)

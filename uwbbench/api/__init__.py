@@ -11,8 +11,10 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from uwbbench.api.aligned import AlignedProfile, Bins, WindowProfile
     from uwbbench.api.anchors import Anchors, Messages
+    from uwbbench.api.apart import in_child
     from uwbbench.api.arrays import BoolArray, ComplexArray, FloatArray, IntArray
     from uwbbench.api.block import Block
+    from uwbbench.api.bounds import check_columns, check_unfolded
     from uwbbench.api.capture import Capture, CaptureHeader, Samples, analytic
     from uwbbench.api.capture_file import list_receivers, open_capture
     from uwbbench.api.capture_writing import write_capture
@@ -21,7 +23,7 @@ if TYPE_CHECKING:
     from uwbbench.api.compiling import compiled, inlined
     from uwbbench.api.dataset import Card, Dataset, DatasetFile, DatasetFolder
     from uwbbench.api.detections import COLUMNS, Detections
-    from uwbbench.api.direct_path import DirectPath, Located, doubt, stated_pulse
+    from uwbbench.api.direct_path import MINIMUM_ECHOES, DirectPath, Located, doubt, stated_pulse
     from uwbbench.api.drive import Drive, compose, odometry_of, relative
     from uwbbench.api.errors import (
         CaptureError,
@@ -67,8 +69,10 @@ if TYPE_CHECKING:
 _HOME = {
     "aligned": ("AlignedProfile", "Bins", "WindowProfile"),
     "anchors": ("Anchors", "Messages"),
+    "apart": ("in_child",),
     "arrays": ("BoolArray", "ComplexArray", "FloatArray", "IntArray"),
     "block": ("Block",),
+    "bounds": ("check_columns", "check_unfolded"),
     "capture": ("Capture", "CaptureHeader", "Samples", "analytic"),
     "capture_file": ("list_receivers", "open_capture"),
     "capture_writing": ("write_capture",),
@@ -77,7 +81,7 @@ _HOME = {
     "compiling": ("compiled", "inlined"),
     "dataset": ("Card", "Dataset", "DatasetFile", "DatasetFolder"),
     "detections": ("COLUMNS", "Detections"),
-    "direct_path": ("DirectPath", "Located", "doubt", "stated_pulse"),
+    "direct_path": ("MINIMUM_ECHOES", "DirectPath", "Located", "doubt", "stated_pulse"),
     "drive": ("Drive", "compose", "odometry_of", "relative"),
     "errors": ("CaptureError", "ConfigError", "PluginError", "ScoringError", "StoreError", "UwbbenchError", "nearest"),
     "filters": ("Limit", "LimitFilter", "RankFilter", "RankParams"),
@@ -118,6 +122,7 @@ __all__ = [
     "CHANNEL_CENTER_HZ",
     "COLUMNS",
     "LANDMARK_KINDS",
+    "MINIMUM_ECHOES",
     "SPEED_OF_LIGHT_M_S",
     "AlignedProfile",
     "Anchors",
@@ -201,6 +206,8 @@ __all__ = [
     "bistatic_range",
     "bistatic_range_sine",
     "cases_of",
+    "check_columns",
+    "check_unfolded",
     "checked",
     "compiled",
     "compose",
@@ -210,6 +217,7 @@ __all__ = [
     "expect_arrays",
     "find_config",
     "hard_case",
+    "in_child",
     "inlined",
     "leak_key",
     "leaks",

@@ -14,6 +14,7 @@ import numpy as np
 
 from uwbbench.api.anchors import Anchors
 from uwbbench.api.arrays import BoolArray, ComplexArray, FloatArray, lock_fields, locked
+from uwbbench.api.bounds import check_places, check_shape, check_truth
 from uwbbench.api.errors import CaptureError
 from uwbbench.api.frames import Frames
 from uwbbench.api.radar import Radar
@@ -174,6 +175,17 @@ class Capture(CaptureHeader):
         if len(self.preamble.shape) != 2:
             raise CaptureError(f"capture '{self.name}': samples have shape (frames, taps), not {self.preamble.shape}")
         frames, taps = self.preamble.shape
+        objects = self.truth.objects if self.truth is not None else ()
+        try:
+            check_shape(frames, taps)
+            check_truth(len(objects), max((obstacle.outline_m.shape[-2] for obstacle in objects), default=0))
+            check_places("position_m", self.trajectory.position_m)
+            if self.odometry_position_m is not None:
+                check_places("odometry_position_m", self.odometry_position_m)
+            for obstacle in objects:
+                check_places(f"the outline of '{obstacle.name}'", obstacle.outline_m)
+        except CaptureError as error:
+            raise CaptureError(f"capture '{self.name}': {error}") from None
         if taps != self.radar.taps:
             raise CaptureError(f"capture '{self.name}': frames have {taps} taps, the radar says {self.radar.taps}")
         if (self.sts1 is None) != (self.sts2 is None):
@@ -193,7 +205,7 @@ class Capture(CaptureHeader):
             value = getattr(self, name)
             if value is not None:
                 counts[name] = value.shape[0]
-        for obstacle in self.truth.objects if self.truth is not None else ():
+        for obstacle in objects:
             if obstacle.moves:
                 counts[f"outline of '{obstacle.name}'"] = len(obstacle.outline_m)
         wrong = {name: count for name, count in counts.items() if count != frames}

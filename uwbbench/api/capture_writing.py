@@ -13,6 +13,7 @@ import h5py
 import numpy as np
 
 from uwbbench.api.anchor_file import same_places, write_anchors
+from uwbbench.api.apart import trust
 from uwbbench.api.capture import Capture
 from uwbbench.api.capture_file import FORMAT, RADAR, RECEIVER_OPTIONAL, TEXTS, TRACKS
 from uwbbench.api.errors import CaptureError
@@ -47,6 +48,7 @@ def write_capture(path: str | os.PathLike[str], *captures: Capture) -> None:
         with h5py.File(partial, "x") as file:
             _write(file, captures)
         partial.replace(target)
+        trust(target)
     except (OSError, RuntimeError) as error:  # HDF5 reports a full disk as either
         raise CaptureError(f"{target}: cannot be written: {error}") from error
     finally:

@@ -7,6 +7,7 @@ from typing import Any, TypeVar
 from pydantic import BaseModel, ValidationError
 
 from uwbbench.api.errors import ConfigError, nearest
+from uwbbench.api.text import quoted
 from uwbbench.api.yaml_file import Path_, YamlFile
 
 M = TypeVar("M", bound=BaseModel)
@@ -49,7 +50,7 @@ def _problem(model: type[BaseModel], data: Any, source: YamlFile, at: Path_, ite
         return f"{source.place((*at, *path[:-1]))}: key '{path[-1]}' is missing"
     message = item["msg"].removeprefix("Value error, ")
     given = item.get("input")
-    tail = "" if isinstance(given, dict | list) or item["type"] == "value_error" else f", found {given!r}"
+    tail = "" if isinstance(given, dict | list) or item["type"] == "value_error" else f", found {quoted(given)}"
     return f"{place}: {message}{tail}"
 
 

@@ -10,8 +10,10 @@ Its name carries two hashes, of all that the function was made from and of its a
 processes may start at once; a file that is damaged is noticed by its checksum and made again.
 
 The files are pickled machine code, as numba writes them: whoever can write to the folder decides what is executed. A
-folder is therefore used only if it belongs to this user, to root or to the owner of the source, and not everyone can
-write to it.
+folder is therefore used only if it belongs to this user, to root or to the owner of the source, and nobody else can
+write to it; one that is missing is made so. Both hold when a file is read or written, and for the file itself: what was
+safe, or missing, when the program started need not be so now. The private group that some systems give to each user is
+the user.
 """
 
 from __future__ import annotations
@@ -58,7 +60,8 @@ class CompiledFiles(MachineCode):
     def __init__(self, function: Callable[..., object], options: dict[str, Any]) -> None:
         self._function = function
         self._options = options
-        self._folders = folders_of(Path(inspect.getfile(function)))
+        self._source = Path(inspect.getfile(function))
+        self._folders = folders_of(self._source)
         name = f"{function.__module__}.{function.__qualname__}".replace("<", "").replace(">", "")
         self._stem = f"{name}.{sys.implementation.cache_tag}-"
 
@@ -87,7 +90,10 @@ class CompiledFiles(MachineCode):
         for folder in self._folders:
             path = folder / self._name(key)
             try:
-                content = path.read_bytes()
+                content = _safe_content(path, self._source)
+            except PermissionError as error:
+                _warn_once(f"{error}: machine code in it is not used")
+                continue
             except OSError:  # not there, or not for us
                 continue
             digest, data = content[:_DIGEST_BYTES], content[_DIGEST_BYTES:]
@@ -107,12 +113,13 @@ class CompiledFiles(MachineCode):
             path = folder / self._name(key)
             partial = path.with_suffix(f".{uuid.uuid4().hex}.part")
             try:
-                folder.mkdir(mode=0o755, parents=True, exist_ok=True)
+                _make(folder)
+                _refuse_open(folder, folder.stat(), self._source)
                 partial.touch(mode=0o644, exist_ok=False)  # whatever the umask, nobody else may change it
                 partial.write_bytes(hashlib.sha256(data).digest() + data)
                 partial.replace(path)
             except OSError as error:
-                problems.append(f"{folder} ({error.strerror})")
+                problems.append(f"{folder} ({error.strerror or error})")
             else:
                 self._remove(folder, stale=True)
                 return
@@ -155,8 +162,8 @@ def folders_of(source: Path) -> tuple[Path, ...]:
         folder = Path(named)
         if not _safe(folder, source):
             raise ConfigError(
-                f"{VARIABLE}: {folder} belongs to another user, or everyone can write to it; its files are executed, "
-                "so name a folder of your own"
+                f"{VARIABLE}: {folder} belongs to another user, or others can write to it; its files are executed, "
+                "so name a folder of your own, that you alone can write to"
             )
         return (folder,)
     folders = [source.parent / "__pycache__"]
@@ -168,9 +175,66 @@ def folders_of(source: Path) -> tuple[Path, ...]:
 def _safe(folder: Path, source: Path) -> bool:
     """Whether nobody but this user, root and the owner of the source can put files into a folder."""
     try:
-        facts = folder.stat()
+        _refuse_open(folder, folder.stat(), source)
+    except PermissionError:
+        return False
     except OSError:  # not there yet, or closed to us: nothing is read from it
         return True
+    return True
+
+
+def _safe_content(path: Path, source: Path) -> bytes:
+    """Content of a file that nobody but these can have written, in a folder that nobody but these can write to.
+
+    Raises
+    ------
+    PermissionError
+        If others can.
+    OSError
+        If it cannot be read.
+    """
     if not hasattr(os, "getuid"):
-        return True
-    return facts.st_uid in (0, os.getuid(), source.stat().st_uid) and not facts.st_mode & stat.S_IWOTH
+        return path.read_bytes()
+    folder = os.open(path.parent, os.O_RDONLY | os.O_DIRECTORY)
+    try:
+        _refuse_open(path.parent, os.fstat(folder), source)
+        with open(os.open(path.name, os.O_RDONLY | os.O_NOFOLLOW, dir_fd=folder), "rb") as file:  # noqa: PTH123
+            _refuse_open(path, os.fstat(file.fileno()), source)
+            return file.read()
+    finally:
+        os.close(folder)
+
+
+def _refuse_open(path: Path, facts: os.stat_result, source: Path) -> None:
+    """Refuse a file or folder that others than this user, root and the owner of the source can write to.
+
+    Raises
+    ------
+    PermissionError
+        If they can.
+    """
+    if not hasattr(os, "getuid"):
+        return
+    theirs = facts.st_uid not in (0, os.getuid(), source.stat().st_uid)
+    of_group = facts.st_mode & stat.S_IWGRP and not _private(facts.st_gid)
+    if theirs or of_group or facts.st_mode & stat.S_IWOTH:
+        raise PermissionError(f"{path} belongs to another user, or others can write to it")
+
+
+def _private(group: int) -> bool:
+    """Whether a group is the one that a system makes for this user alone: of the same name, and without members."""
+    import grp
+    import pwd
+
+    try:
+        user, members = pwd.getpwuid(os.getuid()), grp.getgrgid(group)
+    except KeyError:  # of no name here
+        return False
+    return user.pw_gid == group and user.pw_name == members.gr_name and set(members.gr_mem) <= {user.pw_name}
+
+
+def _make(folder: Path) -> None:
+    """Make a folder, and those above it that are missing, that this user alone can write to, whatever the umask."""
+    if not folder.is_dir():
+        _make(folder.parent)
+        folder.mkdir(mode=0o755, exist_ok=True)

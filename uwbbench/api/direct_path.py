@@ -37,7 +37,10 @@ WORST_MISFIT = 1.5
 """Misfit beyond which the template rises otherwise than the pulse: 0.2 to 0.8 where the pulse is right, 3 to 8 with a
 Gaussian of 3.2 ns in place of a raised cosine of 2 ns or the other way round."""
 
-_REACH, _PHASES = 8, 512
+_REACH, _PHASES, _SEARCHED = 8, 512, 6
+_ALIKE, _TURN = 32, 8
+"""Consecutive echoes on which others lie alike, 20 cm of way at 0.3 m/s and 48 Hz; those of one turn of a group."""
+
 _PULSE_S: FloatArray = np.arange(-56.0, 57.0) * 0.125e-9
 _GROUPS = 4
 
@@ -196,8 +199,8 @@ def doubt(located: Located, echoes: Located | None = None) -> str:
         )
     if abs(located.delay_s) > FARTHEST_S:
         return (
-            f"the direct path does not rise like the pulse, which places it {located.delay_s * cm:+.0f} cm of range from "
-            "its crest, farther than ringing moves one"
+            f"the direct path does not rise like the pulse, which places it {located.delay_s * cm:+.0f} cm of range "
+            "from its crest, farther than ringing moves one"
         )
     if located.sd_s > MOST_UNSURE_S:
         return f"it is unsure by {located.sd_s * cm:.1f} cm of range, more than {MOST_UNSURE_S * cm:.1f}"
@@ -242,7 +245,7 @@ class DirectPath:
         self.interval_s, self._leading = radar.sample_interval_s, radar.noise_taps
         self.template: ComplexArray = np.zeros(radar.taps, complex)
         self.count = self.heard = self.echoes = self._calm = 0
-        self._noise = self._jitter = self._jitter_2 = 0.0
+        self._noise = self._jitter = self._jitter_2 = self._spread = 0.0
         self._pulses: ComplexArray = np.zeros((_GROUPS, len(_PULSE_S)), complex)
         self._weights: FloatArray = np.zeros(_GROUPS)
 
@@ -256,7 +259,7 @@ class DirectPath:
             return None
         unit: ComplexArray = np.asarray(samples.astype(complex) / top)
         magnitude = np.abs(unit)
-        place = self._leading + int(magnitude[self._leading : self._leading + 8].argmax())
+        place = self._leading + int(magnitude[self._leading : self._leading + _SEARCHED].argmax())
         if not magnitude[place] >= 10 * np.median(magnitude):
             return None
         crest = crest_near(unit, place)
@@ -301,15 +304,16 @@ class DirectPath:
         tap = first + int(power[first:stop].argmax())
         others: BoolArray = np.abs(np.arange(len(rest)) - tap) > pulse_taps
         clear = power[tap] > 10**2.2 * noise and tap >= self.crest + round(6e-9 / self.interval_s)
-        if not clear or power[others].max(initial=0.0) > 10**-1.5 * power[tap]:
+        if not clear or power[others].max(initial=0.0) > max(0.01 * power[tap], 10 * noise):
             return
         around: FloatArray = crest_near(rest, tap) + _PULSE_S / self.interval_s
         pulse = between(rest, around)
         middle = pulse[len(pulse) // 2]
         weight = min(power[tap] / noise if noise > 0 else math.inf, 1000.0)
-        group = self.echoes // 8 % _GROUPS
+        group = self.echoes // _TURN % _GROUPS
         self._pulses[group] += weight * pulse / middle
         self._weights[group] += weight
+        self._spread += weight * float((np.abs(pulse / middle) ** 2).mean() - min(noise / power[tap], 1.0))
         self.echoes += 1
 
     @property
@@ -334,12 +338,16 @@ class DirectPath:
     def by_echoes(self) -> Located | None:
         """Direct path located by the pulse of the moving echoes; None with fewer than :data:`MINIMUM_ECHOES`.
 
-        Echoes in four turns give four pulses; half their spread is the error of their mean and part of the answer's.
+        Where the pulses differ by more than noise other echoes lie on them, much alike from frame to frame: that part
+        of their variance counts as if every 32nd were a new one. Echoes in four turns give four pulses, and half the
+        spread of what they say is part of the answer's standard deviation.
         """
         if self.echoes < MINIMUM_ECHOES:
             return None
-        noise = self.noise / self.count + 1 / self._weights.sum()
-        found = self._by(self.echo_pulse[1], noise)
+        pulse, weight = self.echo_pulse[1], self._weights.sum()
+        unlike = max(self._spread / weight - float((np.abs(pulse) ** 2).mean()), 0.0)
+        noise = self.noise / self.count + 1 / weight + unlike / (self.echoes / _ALIKE)
+        found = self._by(pulse, noise)
         each = [self._by(part / w, 4 * noise).delay_s for part, w in zip(self._pulses, self._weights, strict=True)]
         spread = float(np.std(each, ddof=1)) / math.sqrt(_GROUPS)
         return Located(found.delay_s, math.hypot(found.sd_s, spread), found.misfit)

@@ -3,11 +3,24 @@
 from __future__ import annotations
 
 import difflib
+import re
 from collections.abc import Iterable
+
+_LONGEST_WORD, _LONGEST_LINE = 204, 4000
+_LONG_WORD = re.compile(rf"[^\s/]{{{_LONGEST_WORD + 1},}}")
+_LONG_LINE = re.compile(rf"[^\n]{{{_LONGEST_LINE + 1},}}")
+"""Words are cut at slashes: a path is of use only as a whole."""
 
 
 class UwbbenchError(Exception):
-    """A mistake in what the user gave: its text is the whole message, no traceback needed."""
+    """A mistake in what the user gave: its text is the whole message, no traceback needed.
+
+    Words of more than 200 characters, which no message has of its own, are cut, and so are lines of more than 4000.
+    """
+
+    def __str__(self) -> str:
+        text = _LONG_WORD.sub(lambda word: f"{word[0][: _LONGEST_WORD - 3]}...", super().__str__())
+        return _LONG_LINE.sub(lambda line: f"{line[0][: _LONGEST_LINE - 3]}...", text)
 
 
 class CaptureError(UwbbenchError):

@@ -13,11 +13,15 @@ import numpy as np
 from uwbbench.api.arrays import FloatArray, locked
 from uwbbench.api.errors import CaptureError
 from uwbbench.api.geometry import SPEED_OF_LIGHT_M_S, rotate_z
+from uwbbench.api.text import quoted
 
 Vector = tuple[float, float, float]
 
 CHANNEL_CENTER_HZ = {5: 6489.6e6, 9: 7987.2e6}
 """Carriers of the two channels that DW3000 radios have (IEEE 802.15.4-2020, HRP UWB band plan)."""
+
+_LEAST, _MOST = 1e-18, 1e18
+"""Of any frequency and interval, far beyond what there is: products of them neither overflow nor vanish."""
 
 
 @dataclass(frozen=True)
@@ -83,6 +87,8 @@ class Radar:
             value = getattr(self, name)
             if not (np.isfinite(value) and value > 0):
                 raise CaptureError(f"radar {name} must be positive and finite, not {value!r}")
+            if not _LEAST <= value <= _MOST:
+                raise CaptureError(f"radar {name} must lie between {_LEAST:g} and {_MOST:g}, not {quoted(value)}")
         if self.taps < 1:
             raise CaptureError(f"a frame must have at least one tap, not {self.taps}")
         if not 0 <= self.noise_taps <= self.taps:

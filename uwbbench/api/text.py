@@ -14,6 +14,9 @@ from __future__ import annotations
 import inspect
 import re
 
+LONGEST_VALUE = 200
+"""Characters of somebody's value that a message repeats at most."""
+
 _MARKUP = re.compile(
     r"``(?P<literal>.+?)``"
     r"|:[\w:-]+:`(?P<role>[^`]+)`"
@@ -42,6 +45,20 @@ def printable(name: object, longest: int | None = None) -> str:
     """
     text = "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in str(name))
     return text if longest is None or len(text) <= longest else f"{text[: longest - 3]}..."
+
+
+def quoted(value: object) -> str:
+    r"""Value in a message: its ``repr`` on one line, cut where it is long.
+
+    Examples
+    --------
+    >>> quoted("text"), quoted(0.5), len(quoted("x" * 1000))
+    ("'text'", '0.5', 200)
+    """
+    try:
+        return printable(repr(value), LONGEST_VALUE)
+    except ValueError:  # an integer of more digits than Python will write
+        return f"a number of {value.bit_length() if isinstance(value, int) else 'many'} bits"
 
 
 def one_line(prose: object, longest: int | None = None) -> str:

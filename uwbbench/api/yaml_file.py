@@ -14,13 +14,28 @@ from typing import Any
 import yaml
 
 from uwbbench.api.errors import ConfigError
+from uwbbench.api.text import LONGEST_VALUE, printable
 
 Path_ = tuple[str | int, ...]
-_MAX_NODES = 100_000
+MOST_BYTES = 1 << 18
+"""Longest file: ten times the longest that are shipped. It takes seconds to be parsed."""
+_MAX_NODES, _MAX_DEPTH, _MAX_DIGITS = 100_000, 50, 100
 
 
 class _Loader(yaml.SafeLoader):
     """PyYAML's safe loader with the scalar rules of the YAML 1.2 core schema."""
+
+    depth = 0
+
+    def compose_node(self, parent: Any, index: Any) -> Any:
+        """Node with all below it, as long as they are not nested too deeply."""
+        if self.depth == _MAX_DEPTH:
+            mark = self.peek_event().start_mark  # type: ignore[no-untyped-call]
+            raise yaml.MarkedYAMLError(problem=f"nested more than {_MAX_DEPTH} deep", problem_mark=mark)
+        self.depth += 1
+        node = super().compose_node(parent, index)
+        self.depth -= 1
+        return node
 
 
 _Loader.yaml_implicit_resolvers = {}
@@ -40,6 +55,8 @@ _SCALARS = frozenset(f"tag:yaml.org,2002:{tag}" for tag in ("str", "bool", "null
 
 def _integer(text: str) -> int:
     """Value of an integer; a leading zero does not make it octal, as it did in YAML 1.1."""
+    if len(text) > _MAX_DIGITS:
+        raise ValueError(f"more than {_MAX_DIGITS} digits")
     return int(text, 0) if text[:2] in ("0o", "0x") else int(text)
 
 
@@ -86,7 +103,11 @@ def read_yaml(path: Path) -> YamlFile:
         If it cannot be read or is not a mapping.
     """
     try:
-        text = path.read_text(encoding="utf-8")
+        if path.exists() and not path.is_file():
+            raise ConfigError(f"{path}: cannot be read: is no file")
+        with path.open("rb") as file:
+            content = file.read(MOST_BYTES + 1)
+        text = content.decode("utf-8", "strict" if len(content) <= MOST_BYTES else "replace")
     except OSError as error:
         raise ConfigError(f"{path}: cannot be read: {error.strerror or error}") from error
     except UnicodeDecodeError as error:
@@ -95,7 +116,15 @@ def read_yaml(path: Path) -> YamlFile:
 
 
 def parse_yaml(text: str, name: str) -> YamlFile:
-    """Parse YAML text; ``name`` is that of the file in messages."""
+    """Parse YAML text; ``name`` is that of the file in messages.
+
+    Raises
+    ------
+    ConfigError
+        If it is too long, no mapping, or no YAML of plain values.
+    """
+    if len(text.encode(errors="surrogatepass")) > MOST_BYTES:
+        raise ConfigError(f"{name}: is longer than {MOST_BYTES // 1024} KiB, which no configuration needs")
     try:
         loader = _Loader(text)
         node = loader.get_single_node()
@@ -141,7 +170,9 @@ class _Builder:
             return _integer(node.value) if node.tag.endswith(":int") else self.loader.construct_object(node)
         except (ValueError, KeyError) as error:
             kind = node.tag.rpartition(":")[2]
-            raise ConfigError(f"{self.name}:{line}: '{node.value}' is not a valid {kind}") from error
+            raise ConfigError(
+                f"{self.name}:{line}: '{printable(node.value, LONGEST_VALUE)}' is not a valid {kind}"
+            ) from error
 
     def _mapping(self, node: Any, path: Path_) -> dict[Any, Any]:
         values: dict[Any, Any] = {}

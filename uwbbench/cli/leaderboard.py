@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -72,36 +72,71 @@ def _joined(cell: object) -> str:
     return " ".join(part for part in (getattr(cell, "text", ""), getattr(cell, "small", "")) if part)
 
 
-def verify(runs: RunPaths, json: options.Json = False) -> None:
-    """Check that run folders hold what their runs wrote.
+def verify(
+    runs: RunPaths,
+    rerun: Annotated[
+        int | None,
+        typer.Option(
+            min=1,
+            metavar="N",
+            help="Run N units of each again, drawn at random, and compare what they find.",
+            show_default=False,
+        ),
+    ] = None,
+    data_dir: options.DataDir = None,
+    json: options.Json = False,
+) -> None:
+    """Check that run folders are consistent, and with --rerun that detectors find what is stored.
 
-    Files are compared with the hashes noted when the run ended; identities are computed again from the manifest, and
-    scores from the stored detections. Exits with 1 and a list if something does not hold, with 2 where a folder is no
-    run folder.
+    Consistent means: files have the hashes noted when the run ended, and identities, scores and counts follow from the
+    manifest and from the stored detections. That damage and edits are found does not say where detections come from:
+    who seals other detections is found by --rerun alone. Exits with 1 and a list if something does not hold, with 2
+    where a folder is no run folder.
     """
+    from dataclasses import asdict
+
+    from uwbbench.config.source import data_roots
     from uwbbench.run.folder import RunFolder
     from uwbbench.run.folder.verify import verify as check
 
     folders = [RunFolder(path) for path in runs]
-    verifications = {}
+    facts: dict[str, dict[str, Any]] = {}
     for folder in folders:
         _progress(f"verifying {folder.path}")
-        verifications[str(folder.path)] = check(folder)
+        verification = check(folder)
+        of_run = {key: getattr(verification, key) for key in ("passed", "checked", "problems", "notes")}
+        if rerun is not None and verification.passed:
+            from uwbbench.run.rerun import rerun as run_again
+
+            _progress(f"running {rerun} units of {folder.path} again")
+            repeated = run_again(folder, rerun, data_roots(data_dir))
+            of_run |= {"rerun": asdict(repeated), "passed": not repeated.problems}
+        facts[str(folder.path)] = of_run
     if json:
-        facts = {
-            path: {key: getattr(verification, key) for key in ("passed", "checked", "problems", "notes")}
-            for path, verification in verifications.items()
-        }
         render.print_json(facts)
     else:
-        for path, verification in verifications.items():
-            counts = ", ".join(f"{count} {what}" for what, count in verification.checked.items())
-            typer.echo(f"{path}: {'verified' if verification.passed else 'DOES NOT HOLD'} ({counts})")
-            for problem in verification.problems:
-                typer.echo(f"  {problem}")
-            render.print_notes(verification.notes)
-    if not all(verification.passed for verification in verifications.values()):
+        for path, of_run in facts.items():
+            _print_verification(path, of_run)
+    if not all(of_run["passed"] for of_run in facts.values()):
         raise typer.Exit(CHECK_FAILED)
+
+
+def _print_verification(path: str, of_run: dict[str, Any]) -> None:
+    repeated = of_run.get("rerun")
+    counts = ", ".join(f"{count} {what}" for what, count in of_run["checked"].items())
+    consistent = not of_run["problems"]
+    typer.echo(f"{path}: {'consistent' if consistent else 'DOES NOT HOLD'} ({counts})")
+    for problem in of_run["problems"]:
+        typer.echo(f"  {problem}")
+    if repeated is not None:
+        same = f"{repeated['identical']} identical, {repeated['equal']} equal up to rounding"
+        verdict = "DOES NOT HOLD" if repeated["problems"] else "repeated"
+        typer.echo(f"{path}: {verdict} ({len(repeated['units'])} units run again: {same})")
+        for problem in repeated["problems"]:
+            typer.echo(f"  {problem}")
+    elif consistent:
+        typer.echo("  its numbers follow from its detections; where these come from, --rerun N shows")
+    render.print_notes(of_run["notes"])
 
 
 def diff(
@@ -150,4 +185,4 @@ def register(app: typer.Typer) -> None:
     """Add these commands."""
     app.command(epilog="Example: uwbbench diff before after --figure worst.png")(diff)
     app.command(epilog="Example: uwbbench leaderboard runs/* -o site")(leaderboard)
-    app.command(epilog="Example: uwbbench verify demo")(verify)
+    app.command(epilog="Example: uwbbench verify demo --rerun 5")(verify)

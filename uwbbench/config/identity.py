@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 RESULTS_FILE = "results file"
@@ -36,7 +36,7 @@ def detector_identity(config: Mapping[str, Any], sources: Mapping[str, str]) -> 
         SHA-256 of the sources of each stage by its name, and of each kernel, which may stand for some, by its name
         behind ``KERNEL``. Those of other stages do not count. For a detector that is known by what it has written
         alone: SHA-256 of that by its name behind ``RESULTS``, and nothing else. That of a mapper by its name behind
-        ``MAPPER``.
+        ``MAPPER``, and those of mappers inside it by :func:`inside`; runs of older versions have none of these.
     """
     if from_results(config):
         name = f"{RESULTS}{config['name']}"
@@ -45,10 +45,26 @@ def detector_identity(config: Mapping[str, Any], sources: Mapping[str, str]) -> 
         used = {step["use"]: sources[step["use"]] for step in config["pipeline"]}
         used |= {name: sha256 for name, sha256 in sources.items() if name.startswith(KERNEL)}
         if "mapper" in config:
-            name = f"{MAPPER}{config['mapper']['use']}"
-            used[name] = sources[name]
+            use, params = config["mapper"]["use"], config["mapper"].get("params", {})
+            used[f"{MAPPER}{use}"] = sources[f"{MAPPER}{use}"]
+            within = {inside(use, other) for other in named_within(params)}
+            used |= {name: sha256 for name, sha256 in sources.items() if name in within}
     text = json.dumps({"detector": config, "sources": used}, sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()
+
+
+def inside(outer: str, inner: str) -> str:
+    """Name among the names of sources of a mapper that another one has at work inside it."""
+    return f"{MAPPER}{outer} with {inner}"
+
+
+def named_within(params: Mapping[str, Any]) -> Iterator[str]:
+    """Names of plugins that parameters name as ``{use: NAME}``, at any depth."""
+    for value in params.values():
+        if isinstance(value, Mapping):
+            if isinstance(value.get("use"), str):
+                yield value["use"]
+            yield from named_within(value)
 
 
 BOUND = "bound"

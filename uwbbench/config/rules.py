@@ -84,5 +84,7 @@ MetricsUse = Annotated[
 class IntervalModel(ConfigModel):
     """How uncertainty is estimated."""
 
-    resamples: int = Field(default=1000, ge=100, description="No longer used: intervals need no resampling.")
+    resamples: int = Field(
+        default=1000, ge=100, le=1_000_000, description="No longer used: intervals need no resampling."
+    )
     confidence: float = Field(default=0.95, gt=0, lt=1)

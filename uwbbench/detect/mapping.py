@@ -60,12 +60,14 @@ def _with_hidden_background(capture: Capture) -> Capture:
 class _Receiver:
     """One receiver of a run: its front end, and the rows that wait for the other receivers."""
 
-    def __init__(self, name: str, pipeline: Pipeline, capture: Capture, steps: IntArray) -> None:
+    def __init__(self, name: str, pipeline: Pipeline, capture: Capture, steps: IntArray, *, keep: bool) -> None:
         self.name, self.steps, self.anchors = name, steps, capture.anchors
+        self.pipeline, self.capture, self._keeps = pipeline, capture, keep
         # Stages that need the truth are shown it, with the true poses; all others have the frames alone.
         self.stream: Stream = pipeline.open(_with_hidden_background(capture))
         self.given = -1
         self._waiting = Detections.empty()
+        self._answers: list[Detections] = []
 
     def detect(self, frames: Frames) -> None:
         """Let the front end answer."""
@@ -76,7 +78,14 @@ class _Receiver:
         """Let the front end answer for what it holds back."""
         self._keep(self.stream.flush())
 
+    @property
+    def answers(self) -> Detections:
+        """Frames of the rows, and those answered for, so far, where they are kept."""
+        return Detections.join(self._answers)
+
     def _keep(self, found: Detections) -> None:
+        if self._keeps:
+            self._answers.append(Detections(found.frame, processed=found.processed))
         self._waiting = Detections.join([self._waiting, found]) if len(self._waiting) else found
 
     @property
@@ -163,6 +172,23 @@ class MapperLoop:
     def rows(self) -> Detections:
         """Rows of all front ends so far, where they are kept: by step, with the place of their receiver."""
         return Detections.join(self._rows) if self._rows else Detections.empty()
+
+    def ready(self) -> IntArray:
+        """Step (steps,) after which all front ends have answered for each; the number of steps for only at the end.
+
+        For a whole run whose rows are kept: each front end goes through its capture once more, in smaller parts.
+        """
+        steps = len(self._drive)
+        ready = np.arange(steps)
+        for receiver in self._receivers:
+            found = with_hand_outs(receiver.pipeline, receiver.capture, receiver.answers)
+            if found.answered is None:
+                continue
+            after = np.append(receiver.steps, steps)[found.answered]
+            own = np.zeros(steps, np.int64)
+            own[receiver.steps[found.processed]] = after
+            ready = np.maximum(ready, np.maximum.accumulate(own))
+        return ready
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -287,7 +313,7 @@ class MappingPipeline:
             raise ConfigError(f"detector '{self.name}': mapper '{use}' needs truth; run '{drive.name}' has none")
         unknown = sorted(set(self.config.fronts) - set(drive.radars))
         receivers = [
-            _Receiver(name, Pipeline(self.config.front(name)), capture, drive.steps[name])
+            _Receiver(name, Pipeline(self.config.front(name)), capture, drive.steps[name], keep=keep)
             for name, capture in zip(drive.radars, drive.captures, strict=True)
         ]
         mapper = self._mapper(self._mapper.params_type().model_validate(self._use.params))
@@ -324,7 +350,7 @@ class MappingPipeline:
         )
         if not handed_out:
             return found
-        ready = self._ready(drive)
+        ready = loop.ready()
         return found.with_hand_outs(ready[found.frame], ready[poses.index])
 
     def answers(self, drive: Drive, steps: int) -> Detections:
@@ -341,21 +367,6 @@ class MappingPipeline:
         early = found.processed < steps
         index, answered = found.processed[early], found.answered[early]
         return Detections(index, processed=index).with_hand_outs(answered, answered)
-
-    def _ready(self, drive: Drive) -> IntArray:
-        """Step (steps,) after which all front ends have answered for each; the number of steps for only at the end."""
-        ready = np.arange(len(drive))
-        for capture in drive.captures:
-            front = Pipeline(self.config.front(capture.radar.receiver))
-            steps = drive.steps[capture.radar.receiver]
-            found = with_hand_outs(front, capture, front.run(capture))
-            if found.answered is None:
-                continue
-            after = np.append(steps, len(drive))[found.answered]
-            own = np.zeros(len(drive), np.int64)
-            own[steps[found.processed]] = after
-            ready = np.maximum(ready, np.maximum.accumulate(own))
-        return ready
 
 
 def load_mapper(

@@ -20,7 +20,7 @@ from uwbbench.api.radar import Radar
 from uwbbench.api.stage import Stage
 from uwbbench.api.weights import load_weights
 from uwbbench.config.detector import DetectorConfig, Step, detector_from_text, read_detector
-from uwbbench.config.identity import KERNEL, MAPPER, detector_identity
+from uwbbench.config.identity import KERNEL, MAPPER, detector_identity, inside, named_within
 from uwbbench.config.weights import portable_weights
 from uwbbench.detect.hand_out import with_hand_outs
 from uwbbench.detect.opening import Chosen, background_of, opened
@@ -289,6 +289,8 @@ class Pipeline:
         if self.config.mapper is not None:
             used = self.config.mapper.use
             hashes[f"{MAPPER}{used}"] = source_hash(registry.load_plugin("mappers", used).__module__)
+            for other in set(named_within(self.config.mapper.params)) & set(registry.entries("mappers")):
+                hashes[inside(used, other)] = source_hash(registry.load_plugin("mappers", other).__module__)
         for name in registry.entries("kernels"):
             with contextlib.suppress(PluginError):  # one that cannot be loaded is not used
                 hashes[f"{KERNEL}{name}"] = source_hash(registry.load_plugin("kernels", name).__module__)

@@ -153,6 +153,8 @@ def _contents(path: Path) -> dict[Path, bytes]:
         raise ScoringError(f"{lists[0]}: {lists[1].name} lies beside it; keep one of them")
     contents = {}
     for one in (path, *lists):
+        if one.exists() and not one.is_file():
+            raise ScoringError(f"{one}: cannot be read: is no file")
         try:
             contents[one] = one.read_bytes()
         except OSError as error:

@@ -20,8 +20,8 @@ from uwbbench.detect.pipeline import Pipeline
 MINIMUM_MATCHES = 10
 """Fewest detections that an offset is taken from."""
 
-NORMAL_MEDIAN = 0.6745
-"""Median distance of normal errors from their mean, in standard deviations."""
+SCATTER_WITHIN_M = 0.20
+"""Distance from the median within which an error is scatter, and beyond which it is another peak's: a score's gate."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,8 @@ class Calibration:
     stages : mapping
         The detector's stages with its parameters for the channel of the capture, by the names of their steps.
     range_scatter_m : float
-        Spread of the range errors around the offset, which stays: 1.48 times their median distance from it.
+        Spread around the offset, which stays: root mean square of what lies within 20 cm of it. Where the zero was
+        measured itself, that of the crest of the direct path alone.
     range_sd_m : float
         How sure the offset is: its standard deviation. NaN where that is not known.
     zeros_s : mapping
@@ -188,7 +189,7 @@ def calibrate(detector: Pipeline, capture: Capture, gate_m: float = 1.0) -> Cali
     target = distance_m[near].argmin(axis=1)
     errors_m = error_m[near, target]
     range_bias_m = float(np.median(errors_m))
-    scatter_m = float(np.median(np.abs(errors_m - range_bias_m)) / NORMAL_MEDIAN)
+    off_m = errors_m[np.abs(errors_m - range_bias_m) <= SCATTER_WITHIN_M] - range_bias_m
     azimuth_error = wrap_angle(detections.azimuth_rad[near] - sight.azimuth_rad[detections.frame[near], target])
     azimuth_error = azimuth_error[np.isfinite(azimuth_error)]
     return Calibration(
@@ -196,7 +197,7 @@ def calibrate(detector: Pipeline, capture: Capture, gate_m: float = 1.0) -> Cali
         azimuth_bias_rad=float(np.median(azimuth_error)) if len(azimuth_error) >= MINIMUM_MATCHES else None,
         n=len(near),
         stages=stages_of(detector, capture.radar),
-        range_scatter_m=scatter_m,
+        range_scatter_m=float(np.sqrt(np.mean(off_m**2))) if len(off_m) else math.nan,
     )
 
 

@@ -20,6 +20,9 @@ from uwbbench.detect.pipeline import Pipeline
 from uwbbench.measure.calibration import Calibration, stages_of
 
 RESPONSES = ("preamble", "sts1", "sts2")
+NEAR_S = 8e-9
+"""Delay up to which an echo lies on the ringing that locates the direct path."""
+
 _MOST_FRAMES = 4000
 """Frames that a template is learned from; of longer captures every n-th."""
 
@@ -32,7 +35,7 @@ class OwnPath:
     ----------
     receiver, response : str
     frames : int
-        With a direct path; the template is their mean.
+        With a direct path; the template is the mean of those without an echo on their ringing.
     snr_db : float
         Crest of the direct path over the noise of one frame.
     crest_sd_m : float
@@ -179,7 +182,7 @@ def _own_path(capture: Capture, response: str, rows: ComplexArray, pulse: PulseS
     frames = [found[1] for samples in rows if (found := direct.aligned(samples)) is not None]
     if not frames:
         raise ScoringError(f"capture '{capture.name}': no frame's {response} has a direct path 20 dB above its median")
-    for frame in frames:
+    for frame in _calm(np.array(frames), direct):
         direct.learn(frame)
     for frame in frames:
         direct.listen(frame)
@@ -199,7 +202,7 @@ def _own_path(capture: Capture, response: str, rows: ComplexArray, pulse: PulseS
     return OwnPath(
         receiver=capture.radar.receiver,
         response=response,
-        frames=direct.count,
+        frames=len(frames),
         snr_db=-10 * math.log10(direct.noise) if direct.noise > 0 else math.inf,
         crest_sd_m=direct.crest_sd_s * SPEED_OF_LIGHT_M_S / 2,
         ringing_db=20 * math.log10(max(float(np.abs(behind).max(initial=0.0)), 1e-12)),
@@ -210,6 +213,16 @@ def _own_path(capture: Capture, response: str, rows: ComplexArray, pulse: PulseS
         template=direct.template,
         crest=direct.crest,
     )
+
+
+def _calm(frames: ComplexArray, direct: DirectPath) -> ComplexArray:
+    """Aligned frames without an echo so near that it would be learned as ringing; all, where fewer than 40 are."""
+    usual = np.median(frames.real, axis=0) + 1j * np.median(frames.imag, axis=0)
+    power = np.abs(frames - usual) ** 2
+    noise = np.median(power, axis=1) / math.log(2)
+    near = power[:, direct.crest + 1 : direct.crest + round(NEAR_S / direct.interval_s)].max(axis=1, initial=0.0)
+    calm = near < 20 * noise
+    return frames[calm] if calm.sum() >= MINIMUM_ECHOES else frames
 
 
 def _width_s(time_s: FloatArray, height: ComplexArray) -> float:

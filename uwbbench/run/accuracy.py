@@ -106,17 +106,21 @@ class AccuracyPass:
             If a suite's capture is not the one that it was frozen with.
         """
         with tempfile.TemporaryDirectory(prefix="uwbbench-") as scratch:
-            while True:
-                while len(self._running) < self._hands.size and (begun := self._next(Path(scratch))) is not None:
-                    task, handle = begun
-                    self._running[task] = handle
-                    self._hands.start(task)
-                if not self._running:
-                    return
+            self._fill(Path(scratch))
+            while self._running:
                 ending = self._hands.next()
-                yield from self._running.pop(ending.task)(ending)
+                ended = list(self._running.pop(ending.task)(ending))
                 for capture in [one for one in self._open if one.done]:
                     self._close(capture)
+                self._fill(Path(scratch))  # before what has ended is stored, so that nobody waits for that
+                yield from ended
+
+    def _fill(self, scratch: Path) -> None:
+        """Start as many tasks as are carried out at the same time."""
+        while len(self._running) < self._hands.size and (begun := self._next(scratch)) is not None:
+            task, handle = begun
+            self._running[task] = handle
+            self._hands.start(task)
 
     def _next(self, scratch: Path) -> tuple[Task, Handle] | None:
         """Whatever can be done now, and what follows: score, detect, or open one more capture."""

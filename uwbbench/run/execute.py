@@ -26,7 +26,7 @@ from uwbbench.measure.accuracy.scoring import ScoringRules
 from uwbbench.measure.latency.machine import machine, usable_cores
 from uwbbench.run import environment
 from uwbbench.run.accuracy import PATIENCE_S, AccuracyPass, contents
-from uwbbench.run.crew import Hands, Raised, Task, crew_of, unpacked
+from uwbbench.run.crew import Hands, Raised, Task, crew_of, prepare, unpacked
 from uwbbench.run.experiment import Experiment
 from uwbbench.run.folder.folder import RunFolder
 from uwbbench.run.folder.identity import accuracy_identity, canonical, latency_identity, plain, stability_name
@@ -116,6 +116,8 @@ def run_experiment(
         If the user interrupts; nothing finished is lost.
     """
     workers = usable_cores() if jobs is None else max(1, jobs)
+    if isolated:
+        prepare()  # while the plan is made
     todo = plan(experiment)
     _refuse_leaks(experiment, todo)
     made = _resumed if resume else _created
@@ -223,6 +225,7 @@ class _Run:
         self.rules = rules_of(experiment.to_dict())
         self.session = uuid.uuid4().hex
         self.done = self.total = 0
+        self._identities: dict[str, str] = {}
 
     def carry_out(self) -> None:
         before = {entry.unit: entry for entry in self.folder.entries()}
@@ -298,7 +301,14 @@ class _Run:
     def _job(self, unit: Unit) -> Job:
         frozen = self.experiment.frozen
         mark = None if frozen is None else frozen.only(unit.dataset, unit.ref.name)
-        return Job(unit, self._rules(unit.dataset), self.session, mark)
+        identity = "" if unit.detector.results is not None else self._detector_identity(unit.detector)
+        return Job(unit, self._rules(unit.dataset), self.session, identity, mark)
+
+    def _detector_identity(self, detector: DetectorConfig) -> str:
+        """Identity of a detector, for which all its sources are read: once."""
+        if detector.name not in self._identities:
+            self._identities[detector.name] = Pipeline(detector).identity
+        return self._identities[detector.name]
 
     def _rules(self, dataset: str) -> tuple[ScoringRules, ...]:
         """Rules of the captures of one dataset."""
@@ -307,7 +317,7 @@ class _Run:
     def _identity(self, unit: Unit, sha256: str) -> str:
         """Identity of a unit on a capture of this content, here and now."""
         if unit.detector.results is None:
-            detector = Pipeline(unit.detector).identity
+            detector = self._detector_identity(unit.detector)
         else:
             stored = ResultsFolder(unit.detector)
             detector = stored.identity(stored.content(unit.dataset, unit.ref.name))

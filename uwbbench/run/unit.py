@@ -46,6 +46,8 @@ class Job:
     rules : tuple of ScoringRules
     session : str
         Distinct for each run: a process that outlives a run must not use its captures for the next.
+    identity : str
+        Of the detector; empty where another program has found what there is.
     frozen : Frozen or None
         What the capture is held against.
     """
@@ -53,6 +55,7 @@ class Job:
     unit: Unit
     rules: tuple[ScoringRules, ...]
     session: str
+    identity: str = ""
     frozen: Frozen | None = None
 
 
@@ -86,13 +89,10 @@ class Found:
     detections : Detections
     candidates : Detections or None
         Every peak before the filters.
-    identity : str
-        Of the detector.
     """
 
     detections: Detections
     candidates: Detections | None
-    identity: str
 
 
 @dataclass(frozen=True)
@@ -159,17 +159,17 @@ def opened(job: Job, file: Path | None = None) -> Opened:
     return Opened(len(capture), capture.sha256, file if handed else None)
 
 
-_pipelines: dict[tuple[str, str], tuple[Pipeline | MappingPipeline, str]] = {}
+_pipelines: dict[tuple[str, str], Pipeline | MappingPipeline] = {}
 
 
-def _checked(session: str, detector: DetectorConfig) -> tuple[Pipeline | MappingPipeline, str]:
-    """Pipeline of a detector with its identity, for which all sources are read; kept as long as the run lasts."""
+def _checked(session: str, detector: DetectorConfig) -> Pipeline | MappingPipeline:
+    """Pipeline of a detector; kept as long as the run lasts."""
     known = _pipelines.get((session, detector.name))
     if known is None:
         for old in [key for key in _pipelines if key[0] != session]:
             del _pipelines[old]
-        pipeline = Pipeline(detector) if detector.mapper is None else MappingPipeline(detector)
-        known = _pipelines[session, detector.name] = pipeline, pipeline.identity
+        known = Pipeline(detector) if detector.mapper is None else MappingPipeline(detector)
+        _pipelines[session, detector.name] = known
     return known
 
 
@@ -201,10 +201,9 @@ def found(job: Job, file: Path | None = None) -> Found:
 
     with threadpool_limits(1):
         capture = _at_hand(job, file)
-        pipeline, identity = _checked(job.session, job.unit.detector)
-        detections = _detected(pipeline, capture)
+        detections = _detected(_checked(job.session, job.unit.detector), capture)
         candidates = detections.candidates
-    return Found(_bare(detections), None if candidates is None else _bare(candidates), identity)
+    return Found(_bare(detections), None if candidates is None else _bare(candidates))
 
 
 def judged(job: Job, message: bytes | None) -> Finished:
@@ -217,10 +216,10 @@ def judged(job: Job, message: bytes | None) -> Finished:
         A :class:`Found` as the detector's process has packed it; None for what another program has found.
     """
     unit, capture = job.unit, _at_hand(job)
-    stored, results = None, dict[str, Any]()
+    stored, results, identity = None, dict[str, Any](), job.identity
     if message is None:
         stored, results = _read(unit, capture)
-        answer = Found(stored.detections, None, ResultsFolder(unit.detector).identity(stored.sha256))
+        answer, identity = Found(stored.detections, None), ResultsFolder(unit.detector).identity(stored.sha256)
     else:
         answer = unpacked(message)
         if not isinstance(answer, Found):
@@ -249,7 +248,7 @@ def judged(job: Job, message: bytes | None) -> Finished:
     entry = entry_of(
         unit,
         "done",
-        identity=accuracy_identity(answer.identity, capture.sha256, job.rules),
+        identity=accuracy_identity(identity, capture.sha256, job.rules),
         capture_id=unit.capture_id,
         scores=rows,
         facts=facts,

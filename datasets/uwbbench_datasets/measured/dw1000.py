@@ -49,7 +49,7 @@ _CHANNEL = re.compile(r"\bChan (\d+)\b")
 _LENGTH = re.compile(r"Accum Len ([1-9]\d{0,4})\s*")
 _RECEPTION = re.compile(r"RX OK .*\bHLP\((\d+\.\d+)\).*\bRC\(([0-9A-F]{4}) ([0-9A-F]{8})\)")
 _DISTANCE = re.compile(r"Anchor ToF: .*\bDist: (-?\d+\.\d+) m\b")
-_TAP = re.compile(r"-?\d{1,9}, *-?\d{1,9}\s*")
+_TAP = re.compile(r"-?\d{1,9}, *-?\d{1,9}[ \t\r]*", re.ASCII)
 
 
 @dataclass(frozen=True)

@@ -21,6 +21,7 @@ from uwbbench.api import (
     Radar,
     Trajectory,
     Truth,
+    in_child,
     nearest,
 )
 from uwbbench_datasets.measured.pulson440 import BANDWIDTH_HZ, BIN_S, CENTER_FREQUENCY_HZ, DEVICE_OFFSET_S
@@ -52,6 +53,12 @@ def read_scans(path: Path) -> tuple[FloatArray, FloatArray, float, float]:
     CaptureError
         If the file is no MATLAB file, or its ``scn`` is not an array of scans of one length and step.
     """
+    import scipy.io  # here, so that not each child has to  # noqa: F401
+
+    return in_child(path, lambda: _read_scans(path))
+
+
+def _read_scans(path: Path) -> tuple[FloatArray, FloatArray, float, float]:
     from scipy.io import loadmat
 
     try:

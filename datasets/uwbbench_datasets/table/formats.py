@@ -6,6 +6,7 @@ groups ``group/array``.
 
 from __future__ import annotations
 
+import zipfile
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from uwbbench.api import CaptureError, nearest
+from uwbbench.api import CaptureError, check_columns, check_unfolded, in_child, nearest
 
 Columns = dict[str, np.ndarray]
 
@@ -62,6 +63,8 @@ def open_recording(path: Path, delimiter: str = ",") -> Recording:
         raise CaptureError(f"{path}: '{suffix}' is no format of a table.{nearest(suffix, _FORMATS)}")
     try:
         names, read = _FORMATS[suffix](path, delimiter)
+    except CaptureError:
+        raise
     except Exception as error:  # each format's library raises what it likes on a damaged file
         raise CaptureError(f"{path}: not a readable {suffix} file: {type(error).__name__}: {error}") from error
     return Recording(path, tuple(names), read)
@@ -90,7 +93,9 @@ def _open_parquet(path: Path, _: str) -> _Opened:
         table = pd.read_parquet(path, columns=wanted)
         return {name: table[name].to_numpy() for name in wanted}
 
-    return parquet.read_schema(path).names, read
+    file = parquet.ParquetFile(path)
+    check_columns(path, file.metadata)
+    return file.schema_arrow.names, read
 
 
 def _open_npz(path: Path, _: str) -> _Opened:
@@ -98,6 +103,8 @@ def _open_npz(path: Path, _: str) -> _Opened:
         with np.load(path, allow_pickle=False) as file:
             return {name: file[name] for name in wanted}
 
+    with zipfile.ZipFile(path) as archive:
+        check_unfolded(str(path), sum(part.file_size for part in archive.infolist()), path.stat().st_size)
     with np.load(path, allow_pickle=False) as file:
         return list(file.files), read
 
@@ -105,15 +112,23 @@ def _open_npz(path: Path, _: str) -> _Opened:
 def _open_mat(path: Path, _: str) -> _Opened:
     """MATLAB 5 to 7.2 through scipy; 7.3 is HDF5 with MATLAB's conventions."""
     import h5py
-    from scipy.io import loadmat
+    import scipy.io  # here, so that not each child has to  # noqa: F401
 
     if h5py.is_hdf5(path):
         return _open_mat73(path)
+    flat = in_child(path, lambda: _variables(path))
+    return list(flat), lambda wanted: {name: flat[name] for name in wanted}
+
+
+def _variables(path: Path) -> Columns:
+    """All that a MATLAB 5 file holds."""
+    from scipy.io import loadmat
+
     flat: Columns = {}
     for name, value in loadmat(path).items():
         if not name.startswith("__"):
             _flatten(name, value, flat)
-    return list(flat), lambda wanted: {name: flat[name] for name in wanted}
+    return flat
 
 
 def _flatten(name: str, value: Any, into: Columns) -> None:
@@ -133,7 +148,7 @@ def _open_mat73(path: Path) -> _Opened:
     import h5py
 
     def plain(file: Any, item: Any) -> np.ndarray:
-        values = item[()]
+        values = _sound(path, item)[()]
         if h5py.check_ref_dtype(item.dtype):  # a cell array
             cells = [plain(file, file[reference]) for reference in np.ravel(values)]
             return np.array([cell.item() if cell.size == 1 else cell for cell in cells], dtype=object)
@@ -147,7 +162,8 @@ def _open_mat73(path: Path) -> _Opened:
         with h5py.File(path, "r") as file:
             return {name: plain(file, file[name.replace(".", "/")]) for name in wanted}
 
-    return [name.replace("/", ".") for name in _arrays_in(path) if not name.startswith("#")], read
+    names = [name.replace("/", ".") for name in _arrays_in(path) if not name.startswith("#")]
+    return names, lambda wanted: in_child(path, lambda: read(wanted))
 
 
 def _open_hdf5(path: Path, _: str) -> _Opened:
@@ -155,23 +171,35 @@ def _open_hdf5(path: Path, _: str) -> _Opened:
 
     def read(wanted: list[str]) -> Columns:
         with h5py.File(path, "r") as file:
-            items = {name: file[name] for name in wanted}
+            items = {name: _sound(path, file[name]) for name in wanted}
             return {
                 name: np.asarray(item.asstr()[()] if h5py.check_string_dtype(item.dtype) else item[()])
                 for name, item in items.items()
             }
 
-    return _arrays_in(path), read
+    return _arrays_in(path), lambda wanted: in_child(path, lambda: read(wanted))
 
 
 def _arrays_in(path: Path) -> list[str]:
     """Arrays of an HDF5 file by path; links out of the file are not followed."""
     import h5py
 
-    names: list[str] = []
-    with h5py.File(path, "r") as file:
-        file.visititems(lambda name, item: names.append(name) if isinstance(item, h5py.Dataset) else None)
-    return names
+    def found() -> list[str]:
+        names: list[str] = []
+        with h5py.File(path, "r") as file:
+            file.visititems(lambda name, item: names.append(name) if isinstance(item, h5py.Dataset) else None)
+        return names
+
+    return in_child(path, found)
+
+
+def _sound(path: Path, item: Any) -> Any:
+    """An array of an HDF5 file that lies in it and is not far larger than it."""
+    if item.external or item.is_virtual:
+        raise CaptureError(f"{path}: {item.name}: the array lies in another file; it must lie in this one")
+    stored = path.stat().st_size if item.chunks is None else item.id.get_storage_size()
+    check_unfolded(f"{path}: {item.name}", item.size * item.dtype.itemsize, stored)
+    return item
 
 
 _FORMATS: dict[str, Callable[[Path, str], _Opened]] = {

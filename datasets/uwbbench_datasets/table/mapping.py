@@ -290,6 +290,8 @@ def below(folder: Path, name: str) -> Path:
     ConfigError
         If it leads out of that folder, by ``..``, as an absolute path or through a link.
     """
+    if "\0" in name:
+        raise ConfigError(f"{name!r} names no file below {folder}: it holds a NUL character")
     path = folder / name
     if Path(name).is_absolute() or ".." in Path(name).parts or not path.resolve().is_relative_to(folder.resolve()):
         raise ConfigError(

@@ -8,13 +8,13 @@ from typing import ClassVar, Literal, Self, TypeVar
 import numpy as np
 from pydantic import Field, model_validator
 
-from uwbbench.api import Block, DirectPath, FloatArray, Located, Params, Radar, doubt, stated_pulse
+from uwbbench.api import MINIMUM_ECHOES, Block, DirectPath, FloatArray, Located, Params, Radar, doubt, stated_pulse
 from uwbbench_detectors.first_path.estimators import FirstPath
 
 P = TypeVar("P", bound=Params)
 
 LEARNING = 48
-"""Frames behind which the template is looked at for the first time; then whenever their number has doubled."""
+"""Frames behind which the template is looked at for the first time."""
 
 
 class LocatedFirstPath(FirstPath[P]):
@@ -24,16 +24,23 @@ class LocatedFirstPath(FirstPath[P]):
     ----------------
     label : str
         Name in notes.
+    first_look : int
+        Witnesses that the first look needs.
     """
 
     label: ClassVar[str]
+    first_look: ClassVar[int] = LEARNING
 
     def open(self, radar: Radar) -> None:
         """Start without a template."""
         super().open(radar)
         self._direct = DirectPath(radar) if radar.first_tap_delay_s is None else None
         self._zero_taps = 0.0
-        self._next = LEARNING
+        self._next = self.first_look
+
+    def witnesses(self, direct: DirectPath) -> int:
+        """What a look needs, and twice as many for the next: frames."""
+        return direct.count
 
     def locate(self, direct: DirectPath) -> tuple[Located | None, str]:
         """Where the direct path lies, and why that is not to be believed; empty where it is."""
@@ -52,7 +59,8 @@ class LocatedFirstPath(FirstPath[P]):
             if self._direct.count >= LEARNING // 2:
                 self._direct.listen(frame)
             self._direct.learn(frame)
-            if self._direct.count == self._next:
+            witnesses = self.witnesses(self._direct)
+            if self._direct.count >= LEARNING and witnesses >= self._next:
                 self._next *= 2
                 self._look(self._direct)
         return taps
@@ -89,11 +97,11 @@ class KnownPulseFirstPath(LocatedFirstPath[KnownPulseParams]):
     """Direct path by a pulse that is known, where the radar does not contradict it; an opt-in.
 
     From frame 48 on, whenever the number of frames has doubled, the delay of the direct path behind the crest is the
-    mean of its posterior in the running template (:func:`uwbbench.api.locate`). It is refused, with a note, and the
-    zero stays at the crest, where the template does not fit pulse and ringing, where it leaves the direct path unsure
-    by more than 1.5 cm of range, or where the pulse of moving echoes places it elsewhere. **Without moving echoes a
-    tail of the pulse itself cannot be told from ringing**: the template is the same, and the zero is off by what the
-    tail moves it, 4 cm for one of -9 dB behind one tap. It takes about a third of a millisecond a frame.
+    mean of its posterior in the running template (:func:`uwbbench.api.direct_path.locate`). It is refused, with a note,
+    and the zero stays at the crest, where the template does not fit pulse and ringing, where it leaves the direct path
+    unsure by more than 1.5 cm of range, or where the pulse of moving echoes places it elsewhere. **Without moving
+    echoes a tail of the pulse itself cannot be told from ringing**: the template is the same, and the zero is off by
+    what the tail moves it, 4 cm for one of -9 dB behind one tap. It takes about a third of a millisecond a frame.
     """
 
     label = "first_path.known_pulse"
@@ -115,13 +123,18 @@ class EchoPulseFirstPath(LocatedFirstPath[Params]):
     """Direct path by the pulse of echoes that move against the robot, measured on the way.
 
     Echoes hold no ringing, so that their mean is the pulse of the radar, tails and all. Once 40 of them stood 22 dB
-    above the noise, 6 ns behind the crest, and 15 dB above all others, they locate the direct path as in
-    ``first_path.known_pulse``; until then, and where the answer is unsure by more than 1.5 cm of range, the zero stays
-    at the crest. The zero steps by up to some centimetres where it is found. It takes about a third of a millisecond
-    a frame.
+    above the noise, 6 ns behind the crest, and 20 dB above all others, and whenever their number has doubled, they
+    locate the direct path as in ``first_path.known_pulse``; until then, and where the answer is unsure by more than 1.5
+    cm of range, the zero stays at the crest. The zero steps by up to some centimetres where it is found. It takes about
+    a third of a millisecond a frame.
     """
 
     label = "first_path.echo_pulse"
+    first_look = MINIMUM_ECHOES
+
+    def witnesses(self, direct: DirectPath) -> int:
+        """Echoes."""
+        return direct.echoes
 
     def locate(self, direct: DirectPath) -> tuple[Located | None, str]:
         """By the echoes; not yet where there are too few."""

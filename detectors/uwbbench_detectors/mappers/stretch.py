@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -12,7 +11,7 @@ import numpy as np
 from uwbbench.api import BoolArray, Detections, FloatArray, Radar, compose, wrap_angle
 from uwbbench_detectors.mappers.echoes import Echoes
 from uwbbench_detectors.mappers.walls import WallParams
-from uwbbench_detectors.mappers.window import WindowParams
+from uwbbench_detectors.mappers.window import Way, WindowParams
 
 
 @dataclass(frozen=True)
@@ -40,11 +39,10 @@ class Stretch:
     """
 
     def __init__(self, params: WallParams, window: WindowParams, radars: Mapping[str, Radar]) -> None:
-        self._params, self._window = params, window
+        self._params, self._way = params, Way(window)
         self._mounts = {
             name: np.array([*radar.mount_position_m[:2], radar.mount_yaw_rad]) for name, radar in radars.items()
         }
-        self._first = True
         self._kept: deque[Echoes] = deque(maxlen=max(1, round(params.stretch_m / window.travel_m)))
         self.clear()
 
@@ -65,17 +63,13 @@ class Stretch:
             By receiver. Rows whose range or azimuth is not finite are left out.
         """
         self._pose = compose(self._pose, moved)
-        way, turn = math.hypot(moved[0], moved[1]), abs(float(moved[2]))
-        self._travel_m += way
-        self._turn_rad += turn
-        stands = not self._first and way <= self._window.standing_m and turn <= self._window.standing_rad
-        self._first = False
-        self._steps.append((moved, [] if stands else [self._take_in(name, rows) for name, rows in found.items()]))
+        counts = self._way.add(moved)
+        self._steps.append((moved, [self._take_in(name, rows) for name, rows in found.items()] if counts else []))
 
     @property
     def full(self) -> bool:
         """Whether the robot has gone as far as a window reaches."""
-        return self._travel_m >= self._window.travel_m or self._turn_rad >= self._window.turn_rad
+        return self._way.full
 
     @property
     def echoes(self) -> Echoes:
@@ -115,7 +109,7 @@ class Stretch:
             self._kept[place] = self._kept[place].take(~gone)
 
     def _begin(self) -> None:
-        self._travel_m = self._turn_rad = 0.0
+        self._way.begin()
         self._steps: list[tuple[FloatArray, list[_Found]]] = []
         self._fresh: list[Echoes] = []
 

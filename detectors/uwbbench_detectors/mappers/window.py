@@ -46,6 +46,38 @@ class Gathered:
     points: int
 
 
+class Way:
+    """How far a robot has gone since a window began.
+
+    Parameters
+    ----------
+    params : WindowParams
+    """
+
+    def __init__(self, params: WindowParams) -> None:
+        self._params = params
+        self._first = True
+        self.begin()
+
+    def begin(self) -> None:
+        """Count from here."""
+        self._travel_m = self._turn_rad = 0.0
+
+    def add(self, moved: FloatArray) -> bool:
+        """Count a step (3,) of odometry; whether it adds points, as the first does and each with a movement."""
+        way, turn = math.hypot(moved[0], moved[1]), abs(float(moved[2]))
+        self._travel_m += way
+        self._turn_rad += turn
+        counts = self._first or way > self._params.standing_m or turn > self._params.standing_rad
+        self._first = False
+        return counts
+
+    @property
+    def full(self) -> bool:
+        """Whether the robot has gone as far as a window reaches."""
+        return self._travel_m >= self._params.travel_m or self._turn_rad >= self._params.turn_rad
+
+
 class Window:
     """Gathers points in the frame of odometry, where those of what stands still lie on each other.
 
@@ -63,14 +95,13 @@ class Window:
         self._mounts = {
             name: np.array([*radar.mount_position_m[:2], radar.mount_yaw_rad]) for name, radar in radars.items()
         }
-        self._first = True
+        self._way = Way(params)
         self.clear()
 
     def clear(self) -> None:
         """Forget the points so far, as where they and those to come have no frame in common."""
         self._pose: FloatArray = np.zeros(3)
-        self._travel_m: float = 0.0
-        self._turn_rad: float = 0.0
+        self._way.begin()
         self._points: list[FloatArray] = []
 
     def add(self, moved: FloatArray, found: Mapping[str, Detections]) -> None:
@@ -84,17 +115,13 @@ class Window:
             By receiver. Rows whose range or azimuth is not finite are left out.
         """
         self._pose = compose(self._pose, moved)
-        way, turn = math.hypot(moved[0], moved[1]), abs(float(moved[2]))
-        self._travel_m += way
-        self._turn_rad += turn
-        if self._first or way > self._params.standing_m or turn > self._params.standing_rad:
-            self._first = False
+        if self._way.add(moved):
             self._points += [self._points_of(name, rows) for name, rows in found.items() if len(rows)]
 
     @property
     def full(self) -> bool:
         """Whether the robot has gone as far as a window reaches."""
-        return self._travel_m >= self._params.travel_m or self._turn_rad >= self._params.turn_rad
+        return self._way.full
 
     def take(self) -> list[Gathered]:
         """Clusters of the points, and begin the next window."""

@@ -34,9 +34,9 @@ class LeadingEdge(Stage[LeadingEdgeParams]):
     """Each detection moved to the first echo of its body.
 
     A body returns several echoes, from a chest, arms and legs, of which now the one and now the other is the brightest;
-    its nearest point is what a range is measured to. The front is the first tap, at most ``depth_m`` before the
-    detection, with at least ``fraction`` of the largest energy there and ``minimum_db`` over the noise; from it the
-    energy is climbed to its next crest, as delays count from crest to crest. Where no tap is so bright the detection
+    its nearest point is what a range is measured to. The front is the first crest, at most ``depth_m`` before the
+    detection, with at least ``fraction`` of the largest energy there and ``minimum_db`` over the noise: delays count
+    from crest to crest, and the rise before a crest is the pulse's own. Where no crest is so bright the detection
     stays. Only ``tap`` changes, to a whole one: ``interpolate`` goes behind this stage.
     """
 

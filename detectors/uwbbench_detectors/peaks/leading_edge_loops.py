@@ -33,15 +33,17 @@ def fronts(
     front = np.full(len(row), -1, np.int64)
     for place in range(len(row)):
         frame, at = amplitude[row[place]], tap[place]
-        earliest = max(at - depth, int(math.floor(first_path[row[place]] + guard)) + 1, 0)
+        earliest = max(at - depth, math.floor(first_path[row[place]] + guard) + 1, 0)
+        crest = at
+        while crest + 1 < len(frame) and frame[crest + 1] > frame[crest]:
+            crest += 1
         largest = 0.0
-        for near in range(earliest, min(at + 2, len(frame))):
+        for near in range(earliest, crest + 1):
             largest = max(largest, frame[near])
         least = max(share * largest, minimum * noise[row[place]])
-        for near in range(earliest, min(at + 1, len(frame))):
-            if frame[near] >= least and frame[near] > 0:
-                while near + 1 < len(frame) and frame[near + 1] > frame[near]:
-                    near += 1
+        for near in range(earliest, crest + 1):
+            rises = near == 0 or frame[near] > frame[near - 1]
+            if rises and frame[near] >= least and (near + 1 == len(frame) or frame[near] >= frame[near + 1]):
                 front[place] = near
                 break
     return front

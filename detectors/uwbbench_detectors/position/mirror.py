@@ -9,6 +9,7 @@ from pydantic import Field
 
 from uwbbench.api import SPEED_OF_LIGHT_M_S, Block, FloatArray, Params, Radar, Stage, ports
 from uwbbench_detectors.integrate.motion import plain
+from uwbbench_detectors.position.receivers import of_receiver
 
 
 class MirrorRangeParams(Params):
@@ -20,7 +21,9 @@ class MirrorRangeParams(Params):
         description="Targets at azimuths up to this are taken to face along the boresight: of a surface that is "
         "driven at, the azimuth is noise.",
     )
-    bias_m: float = Field(0.0, description="Calibration offset that is subtracted.")
+    bias_m: float | dict[str, float] = Field(
+        0.0, description="Calibration offset that is subtracted, one for all receivers or by their names."
+    )
 
 
 class MirrorRange(Stage[MirrorRangeParams]):
@@ -47,7 +50,9 @@ class MirrorRange(Stage[MirrorRangeParams]):
 
     def recalibrated(self, column: str, offset: float) -> dict[str, float]:
         """A bias of ``offset`` metres more."""
-        return {"bias_m": self.params.bias_m + offset} if column == "range_m" else {}
+        if column != "range_m":
+            return {}
+        return {"bias_m": of_receiver(self.params.bias_m, getattr(self, "radar", None), "bias_m") + offset}
 
     def open(self, radar: Radar) -> None:
         """Work out the geometry of the antennas."""
@@ -64,7 +69,7 @@ class MirrorRange(Stage[MirrorRangeParams]):
             loops.INTERVAL_S: radar.sample_interval_s,
             loops.EXCESS_OFFSET_M: radar.baseline_length_m if from_transmission else 0.0,
             loops.SPEED_M_S: SPEED_OF_LIGHT_M_S,
-            loops.BIAS_M: self.params.bias_m,
+            loops.BIAS_M: of_receiver(self.params.bias_m, radar, "range.mirror: bias_m"),
         }
         self.at: FloatArray = np.zeros(loops.SETTINGS)
         self.at[list(settings)] = list(settings.values())

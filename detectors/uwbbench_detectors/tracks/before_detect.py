@@ -10,7 +10,6 @@ from pydantic import Field
 
 from uwbbench.api import SPEED_OF_LIGHT_M_S, Block, Detections, Params, Radar, Stage, ports
 
-
 FRESH_RATE = 0.01
 """Share of frames of noise alone in which some path is fresh, at most."""
 
@@ -59,14 +58,15 @@ class TrackBeforeDetectParams(Params):
     fresh_s: float = Field(
         0.25,
         gt=0,
-        description="Time in which fresh evidence is forgotten. While a body fades its path lives on, and noise near it "
-        "must not be taken for it: a detection needs evidence of this time that noise alone has in a frame of 100.",
+        description="Time in which fresh evidence is forgotten. While a body fades its path lives on, and noise near "
+        "it must not be taken for it: a detection needs evidence of this time that noise alone has in one frame of "
+        "100.",
     )
     start_s: float = Field(
         2.0,
         ge=0,
-        description="What a tap shows on average in this time from the first frame on is where its level starts: a radar "
-        "that warms up, a background that is not yet learnt.",
+        description="What a tap shows on average in this time from the first frame on is where its level starts: a "
+        "radar that warms up, a background that is not yet learnt.",
     )
     level_s: float = Field(
         60.0,
@@ -99,13 +99,13 @@ class TrackBeforeDetect(Stage[TrackBeforeDetectParams]):
     with the true time T between frames, the largest speed v, and ``tau = sqrt(2 depth / acceleration)``. A body that
     fades for some frames stays on its path; what flickers without going on in time gathers little, and a strong echo
     counts for no more than a clear one. The tap with the largest V is the detection of a frame if V exceeds the
-    threshold and there is evidence for it in that very frame: a body that stands as still as the room gives none, and
-    its path is forgotten. ``score_db`` is V.
+    threshold and there is fresh evidence for it, of ``fresh_s`` and of that very frame: a body that stands as still as
+    the room gives none, and its path is forgotten. ``score_db`` is V.
 
     ``neutral`` and the threshold follow from the false-alarm rate, the reach of a step and the taps, as
-    :mod:`uwbbench_detectors.tracks.noise_paths` derives; ``highest_db`` is added to the threshold. Logarithms make the
-    evidence robust, as in a log-CFAR: interference with a heavy tail gains less by it than under the likelihood ratio of
-    Gaussian noise, which is linear in power.
+    :mod:`uwbbench_detectors.tracks.noise_paths` derives; ``highest_db`` is added to the threshold. Logarithms make
+    evidence robust, as in a log-CFAR: interference with a heavy tail gains less by them than under the likelihood ratio
+    of Gaussian noise, which is linear in power.
 
     With several ``targets`` the evidence within a depth of a detection is taken away, and the paths of the next one are
     followed in what is left. Which is which is not kept, and echoes by way of walls are bodies like any other.
@@ -113,15 +113,10 @@ class TrackBeforeDetect(Stage[TrackBeforeDetectParams]):
     Frames that are invalid, of zeros or without noise are passed over, and bodies may go on meanwhile. For a radar that
     stands: before a moving one everything moves.
 
-    Raises
-    ------
-    ConfigError
-        From ``open``, if bodies may go so far from one frame to the next that noise alone makes paths.
-
     References
     ----------
-    Y. Barniv, "Dynamic programming solution for detecting dim moving targets", IEEE Trans. AES 21(1), 1985. R. Nitzberg,
-    "Clutter map CFAR analysis", IEEE Trans. AES 22(4), 1986 (level of each tap; here a mean of logarithms).
+    Y. Barniv, "Dynamic programming solution for detecting dim moving targets", IEEE Trans. AES 21(1), 1985.
+    R. Nitzberg, "Clutter map CFAR analysis", IEEE Trans. AES 22(4), 1986 (level of each tap; here a mean of logarithms).
     """
 
     consumes: ClassVar[frozenset[str]] = ports("frames", "noise", "first_path")

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from uwbbench.api import BoolArray, FloatArray, IntArray, compiled, inlined
+from uwbbench.api import BoolArray, FloatArray, IntArray, compiled
 
 (
     TAPS_A_SECOND,
@@ -23,9 +23,9 @@ from uwbbench.api import BoolArray, FloatArray, IntArray, compiled, inlined
     GUARD_TAPS,
 ) = range(12)
 """Places of the settings: largest speed in taps; times in which a path forgets, as a whole and to be fresh; time at the
-start of which the level of each tap is the mean, and time in which it forgets; power over noise that is no evidence; clips
-of the evidence; what a path must have gathered, as a whole and freshly; taps about a target in which there is no other;
-taps behind the first path that are not looked at."""
+start in which the level of each tap is the mean, and time in which it forgets; power over noise that is no evidence;
+clips of the evidence; what a path must have gathered, as a whole and freshly; taps about a target in which there is no
+other; taps behind the first path that are not looked at."""
 SETTINGS = 12
 TIME_S, ELAPSED_S, REACH_TAPS = range(3)
 """Places of what is carried besides: time of the last usable frame; time since the first; and the taps that a body may
@@ -33,8 +33,10 @@ have gone since the last whole one."""
 CARRIED = 3
 
 
-@inlined
-def weigh(amplitude: FloatArray, noise: float, start: int, level: FloatArray, gain: float, at: FloatArray) -> FloatArray:
+@compiled
+def weigh(
+    amplitude: FloatArray, noise: float, start: int, level: FloatArray, gain: float, at: FloatArray
+) -> FloatArray:
     """Evidence (taps,) of one frame, less what each tap has shown for long.
 
     Parameters
@@ -61,13 +63,14 @@ def weigh(amplitude: FloatArray, noise: float, start: int, level: FloatArray, ga
     return evidence
 
 
-@inlined
+@compiled
 def reached(gathered: FloatArray, reach: int) -> FloatArray:
     """Largest value (taps,) within ``reach`` taps of each, doubling the span that is covered."""
     taps = len(gathered)
     span = 2 * reach + 1
     padded = np.zeros(taps + 2 * reach)  # nothing has been gathered outside of the frame
-    padded[reach : reach + taps] = gathered
+    for tap in range(taps):  # a slice assigned at once would take seconds to compile
+        padded[reach + tap] = gathered[tap]
     covered, length = 1, taps + 2 * reach
     while covered < span:
         step = min(covered, span - covered)
@@ -125,13 +128,13 @@ def follow(
         carried[TIME_S] = timestamp_s[frame]
         carried[ELAPSED_S] += passed_s
         learns = -math.expm1(-passed_s / at[LEVEL_S])
-        if carried[ELAPSED_S] <= at[START_S]:
+        if carried[ELAPSED_S] < at[START_S]:
             learns = passed_s / carried[ELAPSED_S] if carried[ELAPSED_S] > 0 else 1.0
         carried[REACH_TAPS] += at[TAPS_A_SECOND] * passed_s
         reach = int(min(carried[REACH_TAPS], taps - 1.0))
         carried[REACH_TAPS] -= min(math.floor(carried[REACH_TAPS]), carried[REACH_TAPS])
         keeps, stays_fresh = math.exp(-passed_s / at[MEMORY_S]), math.exp(-passed_s / at[FRESH_S])
-        start = min(max(int(math.floor(first_path[frame] + at[GUARD_TAPS])) + 1, 0), taps)
+        start = min(max(math.floor(first_path[frame] + at[GUARD_TAPS]) + 1, 0), taps)
         evidence = weigh(amplitude[frame], noise[frame], start, level, learns, at)
         for target in range(targets):
             best, newest = reached(gathered[target], reach), reached(fresh[target], reach)

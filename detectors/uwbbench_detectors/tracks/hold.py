@@ -27,10 +27,10 @@ class HoldParams(Params):
 class Hold(Stage[HoldParams]):
     """The last detections repeated in frames that have none, until they are too old.
 
-    A held row is the last one of its body with all its columns, but for ``amplitude``, which is NaN: nothing was measured
-    there. It ends after ``hold_s``, where a detection lies within ``depth_m`` and what the body may have gone meanwhile,
-    or where a frame has as many detections as ``targets``. A body that stands is kept so, and a body that has gone is a
-    ghost for as long. No row is held in frames that are invalid or of zeros. For a radar that stands.
+    A held row is the last one of its body with all its columns, but for ``amplitude``, which is NaN: nothing was
+    measured there. It ends after ``hold_s``, where a detection lies within ``depth_m`` and what the body may have gone
+    meanwhile, or where a frame has as many detections as ``targets``. A body that stands is kept so, and one that has
+    gone is a ghost for as long. No row is held in frames that are invalid or of zeros. For a radar that stands.
     """
 
     consumes: ClassVar[frozenset[str]] = ports("frames", "detections", "range_m", "amplitude")
@@ -58,11 +58,9 @@ class Hold(Stage[HoldParams]):
             if len(now) or (self._held and frames.valid[place] and frames.preamble[place].any()):
                 rows += self._step(now, frames.first + place, float(frames.timestamp_s[place]))
         names = list(dict.fromkeys(name for row in rows for name in row)) or list(columns)
-        table = {name: [row.get(name, np.nan) for row in rows] for name in names}
+        table: dict[str, Any] = {name: [row.get(name, np.nan) for row in rows] for name in names}
         frame = table.pop("frame")
-        return block.replace(
-            detections=Detections(frame, processed=found.processed, notes=found.notes, **table)
-        )
+        return block.replace(detections=Detections(frame, processed=found.processed, notes=found.notes, **table))
 
     def _step(self, now: list[dict[str, Any]], frame: int, time_s: float) -> list[dict[str, Any]]:
         """Rows to add to those of one frame."""

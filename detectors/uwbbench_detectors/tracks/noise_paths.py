@@ -2,15 +2,15 @@
 
 A cell of noise has the power ``x`` in units of the noise, exponentially distributed, and the evidence
 ``l = clip(10 log10(x / x0), lowest, highest)``. From frame to frame a path goes on to one of ``n`` cells. The largest
-sum of evidence over all paths that end in a cell, started anew wherever it would be negative, exceeds ``t`` in a frame
-with a probability of at most (union bound over all paths of k frames, and Markov's inequality for each of them)
+sum of evidence over all paths that end in a cell, started anew wherever it would be negative, exceeds ``t`` with a
+probability of at most (union bound over all paths of k frames, and Markov's inequality for each of them)
 
     ``sum over k of n^(k-1) M(theta)^k exp(-theta t) = M / (1 - n M) exp(-theta t)``, ``M(theta) = E[exp(theta l)]``,
 
-for every ``theta`` with ``n M(theta) < 1``. A sum that forgets is never larger. Only independence from frame to frame is
-used, none from cell to cell; noise that was averaged over several cells has a shorter tail than ``x``, so that the bound
-holds for it, too. It is the bound by which a sequential test keeps its rate of false alarms (Wald, Sequential Analysis,
-1947), summed over the paths of a branching walk.
+for every ``theta`` with ``n M(theta) < 1``. A sum that forgets is never larger. Only independence from frame to frame
+is used, none from cell to cell; noise that was averaged over several cells has a shorter tail than ``x``, so that the
+bound holds for it, too. It is the bound by which a sequential test keeps its rate of false alarms (Wald,
+Sequential Analysis, 1947), summed over the paths of a branching walk.
 """
 
 from __future__ import annotations
@@ -19,13 +19,14 @@ import math
 
 import numpy as np
 
-from uwbbench.api import ConfigError, FloatArray
+from uwbbench.api import FloatArray
 
 DB = 10 / math.log(10)
 _EXPONENTS = np.linspace(0.25, 60.0, 240)
 _SURVIVORS = 0.5
 """Paths that noise alone has left of each path, frame by frame, at the offset: they die out."""
-_HIGHEST_DB = 20.0
+_HIGHEST_DB = 17.0
+"""Enough for 10^15 cells."""
 
 
 def moment(neutral_db: float, lowest_db: float, highest_db: float) -> FloatArray:
@@ -65,18 +66,8 @@ def neutral_db(cells: int, lowest_db: float, highest_db: float) -> float:
         Cells n that a path may go on to.
     lowest_db, highest_db : float
         Where the evidence is clipped.
-
-    Raises
-    ------
-    ConfigError
-        If a path may go on to so many cells that none is enough.
     """
     below, above = 0.0, _HIGHEST_DB
-    if not cells * moment(above, lowest_db, highest_db).min() < _SURVIVORS:
-        raise ConfigError(
-            f"track.before_detect: a body may be in any of {cells} taps one frame later: lower speed_m_s, or take "
-            "frames at a higher rate"
-        )
     while above - below > 1e-6:
         middle = (below + above) / 2
         if cells * moment(middle, lowest_db, highest_db).min() < _SURVIVORS:
@@ -110,4 +101,4 @@ def threshold_db(cells: int, taps: int, rate: float, neutral: float, clips: tupl
     mean = moment(neutral, *clips)
     dies = cells * mean < 1
     bound = np.log(taps * mean[dies] / (1 - cells * mean[dies]) / rate) * DB / _EXPONENTS[dies]
-    return float(bound.min())
+    return max(float(bound.min()), 0.0)

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from tests.api.compiled.conftest import SOURCE, VALUES, block, imported, kept
-from uwbbench.api import ConfigError
+from uwbbench.api import ConfigError, compiled_files
 from uwbbench.api.compiling import compile_counts, compiled
 
 ROOT = hasattr(os, "geteuid") and os.geteuid() == 0
@@ -170,7 +170,7 @@ def test_a_named_folder_that_everyone_can_write_to_is_refused(
     (tmp_path / "open").mkdir()
     (tmp_path / "open").chmod(0o1777)
     monkeypatch.setenv("UWBBENCH_CACHE_DIR", str(tmp_path / "open"))
-    with pytest.raises(ConfigError, match=r"UWBBENCH_CACHE_DIR: .*open belongs to another user, or everyone can write"):
+    with pytest.raises(ConfigError, match=r"UWBBENCH_CACHE_DIR: .*open belongs to another user, or others can write"):
         imported(source)
 
 
@@ -183,6 +183,66 @@ def test_a_named_folder_of_another_user_is_refused(
     monkeypatch.setenv("UWBBENCH_CACHE_DIR", str(tmp_path / "theirs"))
     with pytest.raises(ConfigError, match=r"theirs belongs to another user"):
         imported(source)
+
+
+@pytest.mark.parametrize("mode", [0o1777, 0o770])
+def test_a_named_folder_that_others_have_opened_since_is_not_read_from(
+    source: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, fresh, caplog: pytest.LogCaptureFixture, mode: int
+) -> None:
+    monkeypatch.setenv("UWBBENCH_CACHE_DIR", str(tmp_path / "mine"))
+    monkeypatch.setattr(compiled_files, "_private", lambda group: False)
+    imported(source).total(VALUES)
+    module = imported(source)  # its folder was found safe
+    (tmp_path / "mine").chmod(mode)
+    assert fresh() == 2
+    assert module.total(VALUES) == 20.0
+    assert fresh() == 2
+    assert "others can write to it: machine code in it is not used" in caplog.text
+
+
+def test_a_file_that_others_can_write_to_is_not_read(source: Path, monkeypatch: pytest.MonkeyPatch, fresh) -> None:
+    monkeypatch.setattr(compiled_files, "_private", lambda group: False)
+    imported(source).total(VALUES)
+    for path in kept(source.parent / "__pycache__"):
+        path.chmod(0o664)
+    assert fresh() == 2
+    imported(source).total(VALUES)
+    assert fresh() == 2
+
+
+def test_a_link_is_not_read(source: Path, tmp_path: Path, fresh) -> None:
+    imported(source).total(VALUES)
+    for path in kept(source.parent / "__pycache__"):
+        path.rename(tmp_path / path.name)
+        path.symlink_to(tmp_path / path.name)
+    assert fresh() == 2
+    imported(source).total(VALUES)
+    assert fresh() == 2
+
+
+def test_a_named_folder_that_a_group_can_write_to_is_refused(
+    source: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "ours").mkdir()
+    (tmp_path / "ours").chmod(0o775)
+    monkeypatch.setattr(compiled_files, "_private", lambda group: False)
+    monkeypatch.setenv("UWBBENCH_CACHE_DIR", str(tmp_path / "ours"))
+    with pytest.raises(ConfigError, match="ours belongs to another user, or others can write to it"):
+        imported(source)
+
+
+def test_a_missing_folder_and_those_above_it_are_made_for_one_writer(
+    source: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("UWBBENCH_CACHE_DIR", str(tmp_path / "a" / "b" / "c"))
+    old = os.umask(0)
+    try:
+        imported(source).total(VALUES)
+    finally:
+        os.umask(old)
+    made = [tmp_path / "a", tmp_path / "a" / "b", tmp_path / "a" / "b" / "c"]
+    assert [path.stat().st_mode & 0o777 for path in made] == [0o755] * 3
+    assert len(kept(tmp_path / "a" / "b" / "c")) == 2
 
 
 def test_a_default_folder_that_everyone_can_write_to_is_passed_over(source: Path, user_cache: Path) -> None:

@@ -150,3 +150,27 @@ def test_halts_lie_on_the_way_one_behind_the_other(at_m: list[float], message: s
     halts = [{"at_m": one, "seconds": 1.0} for one in at_m]
     with pytest.raises(ValidationError, match=message):
         made(kind="straight", start_m=[0, 0], end_m=[1, 0], halts=halts)
+
+
+@pytest.mark.parametrize("turn_deg_s", [45.0, None])
+def test_a_way_through_points_halts_and_goes_on_as_without(turn_deg_s: float | None) -> None:
+    way = {"kind": "waypoints", "points_m": [[0, 0], [1, 0], [1, 1]], "speed_m_s": 0.5, "turn_deg_s": turn_deg_s}
+    halts = [{"at_m": 0.5, "seconds": 1.5}, {"at_m": 1.5, "seconds": 2.0}]
+    going, halting = made(**way), made(**way, halts=halts)
+    turned_s = 0.0 if turn_deg_s is None else 2.0
+    for start, end, place in ((1.0, 2.5, [0.5, 0.0]), (4.5 + turned_s, 6.5 + turned_s, [1.0, 0.5])):
+        still = (halting.timestamp_s > start + 0.03) & (halting.timestamp_s < end - 0.03)
+        assert np.allclose(halting.position_m[still, :2], place, atol=1e-9)
+    later_s = np.select([halting.timestamp_s < 1, halting.timestamp_s < 2.5], [0.0, np.nan], 1.5)
+    later_s[halting.timestamp_s > 4.5 + turned_s] = np.nan
+    later_s[halting.timestamp_s >= 6.5 + turned_s] = 3.5
+    known = np.isfinite(later_s)
+    at_s = (halting.timestamp_s - later_s)[known]
+    same = [(halting.position_m[:, axis], going.position_m[:, axis]) for axis in range(2)]
+    for one, other in [*same, (halting.yaw_rad, going.yaw_rad)][: 3 if turn_deg_s else 2]:
+        assert np.allclose(one[known], np.interp(at_s, going.timestamp_s, other), atol=0.02)
+
+
+def test_halts_lie_on_a_way_through_points() -> None:
+    with pytest.raises(ValidationError, match=r"2.5 m lies behind the end of the way, 2 m"):
+        made(kind="waypoints", points_m=[[0, 0], [1, 0], [1, 1]], halts=[{"at_m": 2.5, "seconds": 1.0}])

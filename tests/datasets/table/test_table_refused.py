@@ -1,5 +1,6 @@
 """The table adapter: what a wrong mapping and a recording that does not fit get."""
 
+import h5py
 import numpy as np
 import pandas as pd
 import pytest
@@ -7,6 +8,7 @@ import pytest
 from tests.datasets.table.layouts import FRAMES, LAYOUTS, mapping_of, numbered, opened, responses, scalars, separate
 from uwbbench.api import CaptureError, ConfigError
 from uwbbench.config.source import open_dataset
+from uwbbench_datasets.table.formats import open_recording
 
 
 def changed(mapping, path, value):
@@ -37,6 +39,8 @@ def changed(mapping, path, value):
         ("truth.objects", [{"id": "a", "center_m": [0, 0]}], r"objects\[0\]: give either outline_m, or center_m"),
         ("truth.objects", [{"id": "a", "outline_m": [[0, 0], [1, 1, 1]]}], "all of 2 or all of 3"),
         ("files", ["../*.npz"], "must lie below the mapping's folder"),
+        ("files", ["run\0.npz"], "'run.x00.npz' names no file below .*: it holds a NUL character"),
+        ("truth.objects_file", "objects\0.csv", "names no file below .*: it holds a NUL character"),
         ("files", ["/etc/*.npz"], "must lie below the mapping's folder"),
         ("truth.objects_file", "../objects.csv", "must lie below the mapping's folder"),
         ("truth.objects_file", "none.csv", r"none\.csv: cannot be read"),
@@ -138,3 +142,19 @@ def test_pickled_arrays_are_never_loaded(tmp_path, original):
 def test_no_files_anywhere_is_said(tmp_path, original):
     with pytest.raises(CaptureError, match="names no files"):
         opened(tmp_path, mapping_of(original, lambda n: {"complex": n})).names()
+
+
+@pytest.mark.parametrize("suffix", ["h5", "mat"])
+@pytest.mark.parametrize("kind", ["external", "virtual"])
+def test_an_array_in_another_file_is_refused(tmp_path, original, suffix, kind):
+    (tmp_path / "secret.bin").write_bytes(bytes(240))
+    with h5py.File(tmp_path / f"run.{suffix}", "w") as file:
+        if kind == "external":
+            file.create_dataset("a", shape=(6, 5), dtype="f8", external=[(str(tmp_path / "secret.bin"), 0, 240)])
+        else:
+            layout = h5py.VirtualLayout(shape=(6, 5), dtype="f8")
+            layout[:] = h5py.VirtualSource(tmp_path / "other.h5", "a", shape=(6, 5))
+            file.create_virtual_dataset("a", layout)
+    recording = open_recording(tmp_path / f"run.{suffix}")
+    with pytest.raises(CaptureError, match=rf"run\.{suffix}: /a: the array lies in another file"):
+        recording.read(["a"])

@@ -8,6 +8,10 @@ import pytest
 from uwbbench.api import Detections, Poses, Step, load_plugin
 from uwbbench.api.errors import PluginError
 from uwbbench.api.registry import _registered, register
+from uwbbench.config.detector import read_detector
+from uwbbench.config.identity import detector_identity
+from uwbbench.detect.pipeline import Pipeline
+from uwbbench.detect.sources import source_hash
 
 START = np.array([0.3, -0.2, 0.4])
 
@@ -182,6 +186,14 @@ def test_the_grid_can_be_drawn_from_the_poses_of_another_mapper(make_mapper, rad
     theirs, found = mapped(make_mapper(poses={"use": "map.occupancy", "params": {"cell_m": 0.5}}), radars, steps)
     np.testing.assert_array_equal(theirs.pose, poses.pose)
     np.testing.assert_array_equal(found.grid.log_odds, plain.grid.log_odds)
+
+
+def test_a_mapper_of_poses_is_part_of_what_the_detector_is():
+    pipeline = Pipeline(read_detector("map-occupancy", None, {"mapper.params.poses": {"use": "slam.points"}}))
+    sources = pipeline.sources
+    assert sources["mapper map.occupancy with slam.points"] == source_hash("uwbbench_detectors.mappers.slam_points")
+    edited = sources | {"mapper map.occupancy with slam.points": "0" * 64}
+    assert detector_identity(pipeline.config.to_dict(), edited) != pipeline.identity
 
 
 @pytest.mark.parametrize(

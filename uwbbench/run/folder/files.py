@@ -9,7 +9,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from uwbbench.api.errors import StoreError
+from uwbbench.api.bounds import check_columns
+from uwbbench.api.errors import CaptureError, StoreError
 from uwbbench.api.text import one_line
 from uwbbench.run.folder.identity import plain
 
@@ -21,8 +22,13 @@ _FACTS = b"uwbbench"
 
 @contextmanager
 def disk_errors(path: Path, verb: str) -> Iterator[None]:
-    """Turn an operating system error into a :class:`StoreError` that names the path."""
+    """Turn an operating system error into a :class:`StoreError` that names the path.
+
+    What is to be read must be a file or a folder: a device or a pipe may never end.
+    """
     try:
+        if verb == "read" and path.exists() and not (path.is_file() or path.is_dir()):
+            raise StoreError(f"{path}: cannot be read: is neither a file nor a folder")
         yield
     except OSError as error:
         raise StoreError(f"{path}: cannot be {verb}: {one_line(error.strerror or error)}") from error
@@ -115,7 +121,11 @@ def read_parquet(path: Path) -> tuple[pa.Table, Any]:
         with disk_errors(path, "read"):
             # Not read_table(path): that takes "key=value" folders above the file for columns.
             # One thread: the files of a run are many and small, and a thread for each column costs more than it reads.
-            table = pq.ParquetFile(path).read(use_threads=False)
+            file = pq.ParquetFile(path)
+            check_columns(path, file.metadata)
+            table = file.read(use_threads=False)
+    except CaptureError as error:
+        raise StoreError(str(error)) from error
     except pa.ArrowException as error:
         raise StoreError(f"{path}: is not a readable Parquet file: {one_line(error)}") from error
     return table, json.loads((table.schema.metadata or {}).get(_FACTS, b"{}"))

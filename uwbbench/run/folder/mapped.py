@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uwbbench.api.arrays import FloatArray
-from uwbbench.api.errors import StoreError
+from uwbbench.api.bounds import check_unfolded
+from uwbbench.api.errors import CaptureError, StoreError
 from uwbbench.api.mapper import LANDMARK_KINDS, Grid, Landmarks, Map, Mapped, Poses
 from uwbbench.run.folder.files import disk_errors, read_parquet, replacing, write_parquet
 
@@ -152,6 +153,8 @@ def read_map(path: Path) -> Map:
         If the file is missing or broken, or its arrays are not those of a map.
     """
     try:
+        with disk_errors(path, "read"), zipfile.ZipFile(path) as archive:
+            check_unfolded(str(path), sum(part.file_size for part in archive.infolist()), path.stat().st_size)
         with disk_errors(path, "read"), path.open("rb") as file, np.load(file, allow_pickle=False) as stored:
             expected = {**_SHAPES, **(_GRID if any(name in stored for name in _GRID) else {})}
             missing = [name for name in expected if name not in stored]
@@ -162,6 +165,8 @@ def read_map(path: Path) -> Map:
         raise StoreError(f"{path}: is not a readable map: {type(error).__name__}: {error}") from error
     except (zipfile.BadZipFile, zlib.error) as error:
         raise StoreError(f"{path}: is damaged: {error}") from error
+    except CaptureError as error:
+        raise StoreError(str(error)) from error
     columns = [arrays[f"landmark_{name}"] for name in _LANDMARKS]
     if len({len(column) for column in columns}) > 1:
         raise StoreError(f"{path}: is no map: the columns of its landmarks differ in length")

@@ -7,7 +7,8 @@ Conventions
   scores from the stored detections, and percentiles from the stored times. No detector is run.
 * What cannot be computed again is taken as it is: the detections themselves, the truth, time ratios (their blocks are
   not kept), peak memory, the hard cases, and the machine.
-* A hash reveals damage and careless editing. Who forges detections and all that follows from them is not found out.
+* A hash reveals damage and careless editing. Who forges detections and all that follows from them is not found out: a
+  folder that passes is consistent, no more. :mod:`uwbbench.run.rerun` runs detectors again.
 """
 
 from __future__ import annotations

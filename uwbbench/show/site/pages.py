@@ -138,7 +138,7 @@ def _index(content: Content) -> Page:
                 )
             )
     detectors = len(content.names.detectors)
-    lead = f"{detectors} detectors in {len(content.runs)} verified runs. "
+    lead = f"{detectors} detectors in {len(content.runs)} consistent runs. "
     lead += "Only what was measured on the same captures under the same scoring rules is compared."
     parts.append(Part("How to read it", notes=(*HOW, *_margins(content.sections))))
     return Page("index.html", "Leaderboard", badge({one.source for one in content.sections}), lead, tuple(parts))
@@ -380,7 +380,7 @@ def _runs(content: Content) -> Page:
             checked,
         )
         rows.append(tuple(map(Cell, cells)))
-    columns = ("run", "suite", "started", "machine", "versions", "detectors", "units", "verified")
+    columns = ("run", "suite", "started", "machine", "versions", "detectors", "units", "checked")
     failures = [
         tuple(Cell(sentence(text)) for text in (run.name, entry.kind, entry.detector, entry.dataset, entry.reason))
         for run in content.runs
@@ -393,7 +393,7 @@ def _runs(content: Content) -> Page:
         Part("What could not be listed, timed or examined", tables=(Table("Failures", kinds, tuple(failures)),)),
     )
     lead = (
-        "Every run was verified before anything was taken from it: files against their hashes, names and identities "
-        "against the manifest, scores against the stored detections. Detections themselves are taken as they are."
+        "Every run is consistent: files have their hashes, names and identities are those of the manifest, and scores "
+        "follow from the stored detections. Detections themselves are taken as they are: that is no proof of them."
     )
     return Page("runs.html", "Runs", badge({one.source for one in content.sections}), lead, parts)

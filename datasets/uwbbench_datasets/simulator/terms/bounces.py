@@ -123,16 +123,16 @@ class WallBounce(Term[Params]):
             material = reflected(one, frequency) * reflected(other, frequency)
             seen = np.sqrt(view.visibility[:, first] * view.visibility[:, second])
             for near, far in product(faces(one), faces(other)):
-                length, shown, end = zip(_over_both(near, far, view), _over_both(far, near, view), strict=True)
-                twice = shown[0] & shown[1] & (np.abs(length[0] - length[1]) < _SAME_M)
-                for this, there, last in zip(length, shown, end, strict=True):
-                    lengths.append(this)
-                    share = np.where(twice, 0.5, there)
-                    strengths.append(share * seen * material * wavelength / (4 * np.pi * np.maximum(this, 1e-9)))
-                    azimuths.append(view.azimuth_rad(last[:, None])[:, 0])
+                orders = _over_both(near, far, view), _over_both(far, near, view)
+                twice = orders[0][1] & orders[1][1] & (np.abs(orders[0][0] - orders[1][0]) < _SAME_M)
+                for length, shown, end in orders:
+                    lengths.append(length)
+                    share = np.where(twice, 0.5, shown)
+                    strengths.append(share * seen * material * wavelength / (4 * np.pi * np.maximum(length, 1e-9)))
+                    azimuths.append(view.azimuth_rad(end[:, None])[:, 0])
         if not lengths:
             return None
-        return _paths(view, *(np.stack(part, axis=1) for part in (lengths, strengths, azimuths)))
+        return _paths(view, np.stack(lengths, axis=1), np.stack(strengths, axis=1), np.stack(azimuths, axis=1))
 
 
 def _over_both(near: Face, far: Face, view: View) -> tuple[FloatArray, BoolArray, FloatArray]:

@@ -113,7 +113,8 @@ class LateParams(Params):
 class LateFrames(Term[LateParams]):
     """Frames held up on their way to the host: times are those of arrival, and frames wait for those before them.
 
-    Poses and truth stay those of the moment when a frame was taken.
+    Poses and truth stay those of the moment when a frame was taken, and so does odometry: receivers of one run whose
+    frames are held up by different times contradict each other about where the robot was, and are refused as a run.
     """
 
     def record(self, capture: Capture, rng: np.random.Generator) -> Capture:
