@@ -130,7 +130,7 @@ def in_child(path: Path, work: Callable[[], T], least_s: float | None = None) ->
 def _mark(path: Path) -> tuple[Any, ...]:
     """What changes with a file."""
     facts = path.stat()
-    return (str(path.resolve()), facts.st_dev, facts.st_ino, facts.st_size, facts.st_mtime_ns, facts.st_ctime_ns)
+    return (str(path), facts.st_dev, facts.st_ino, facts.st_size, facts.st_mtime_ns, facts.st_ctime_ns)
 
 
 def _done(work: Callable[[], object]) -> None:

@@ -35,8 +35,7 @@ class DopplerRangeParams(MotionParams):
     guard_taps: float = Field(1.0, ge=0, description="Rows begin so many taps behind the direct path.")
     second: bool = Field(
         False,
-        description="Add the power of STS2, of the other antenna, and give rows its phase difference. Needs STS; frames "
-        "that fuse.responses has left.",
+        description="Add the power of STS2, of the other antenna, and give rows its phase difference. Needs STS."
     )
     step_m: float = Field(
         0.001, gt=0, description="Least way between two frames that are added. In between, the last rows stay, as held."

@@ -31,11 +31,11 @@ class FixedTrackParams(MotionParams):
     apart_m: float = Field(0.3, ge=0, description="Objects nearer to each other are one.")
     mirror_db: float = Field(
         3.0,
-        description="An object that reflects so much more than another one, farther away, is taken for a mirror that may "
-        "show it.",
+        description="An object that reflects so much more than another one, farther away, is taken for a mirror that "
+        "may show it.",
     )
     plane_m: float = Field(
-        0.15, ge=0, description="What lies so near the plane of a mirror, or behind it, may be an image, or a part of it."
+        0.15, ge=0, description="What lies so near the plane of a mirror, or behind it, may be its image, or part of it."
     )
     view_deg: float = Field(47.0, gt=0, description="Azimuth up to which objects are rows.")
     looks_deg: float = Field(90.0, gt=0, description="Azimuth up to which an object should be found by a look.")

@@ -234,7 +234,7 @@ def followed(
                 if objects[place, lay.ROW] >= 0:
                     continue
                 for row in range(len(found)):
-                    if found[row, lay.FRAME] >= 0 or not found[row, lay.DETECTED_HELD] == 0:
+                    if found[row, lay.FRAME] >= 0 or found[row, lay.DETECTED_HELD] != 0:
                         continue
                     off = distance(objects[place], found[row], eye[2], at)
                     if off < nearest:
@@ -253,7 +253,7 @@ def followed(
             elif abs(item[lay.AZIMUTH]) < at[lay.LOOKS_RAD] and at[lay.NEAR_M] < item[lay.RANGE] < at[lay.FAR_M]:
                 item[lay.EVIDENCE] += look * at[lay.MISS]
         for row in range(len(found)):
-            taken = found[row, lay.FRAME] >= 0 or not found[row, lay.DETECTED_HELD] == 0
+            taken = found[row, lay.FRAME] >= 0 or found[row, lay.DETECTED_HELD] != 0
             if not taken and found[row, lay.DETECTED_M] > 0 and np.isfinite(found[row, lay.DETECTED_RAD]):
                 if count == lay.MOST:
                     continue
