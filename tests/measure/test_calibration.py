@@ -84,6 +84,12 @@ def test_settings_name_a_step_by_its_own_name():
     assert Calibration(0.2, None, 10, stages).as_settings() == {"pipeline.my range.params.bias_m": pytest.approx(0.3)}
 
 
+def test_an_azimuth_offset_that_no_step_takes_is_left_out():
+    measured = Calibration(0.2, 0.1, 10, {"range": Range(RangeParams())})
+    assert not measured.takes_azimuth
+    assert measured.as_settings() == {"pipeline.range.params.bias_m": 0.2}
+
+
 def test_no_truth_is_an_error(short_approach):
     with pytest.raises(ScoringError, match="ground truth"):
         uwbbench.calibrate(shifted_paper(), dataclasses.replace(short_approach, truth=None))

@@ -134,7 +134,8 @@ class Stage(Generic[P]):
         Parameters
         ----------
         column : str
-            Column of detections, such as ``range_m``.
+            Column of detections, such as ``range_m``; ``preamble_delay_s``, ``sts1_delay_s`` and ``sts2_delay_s`` are
+            the delays of the direct path behind the crest of each response.
         offset : float
             In SI units.
 

@@ -156,6 +156,7 @@ def _offsets(one: Calibration) -> str:
         offsets += f" (standard deviation {one.range_sd_m:.4f} m)"
     if one.azimuth_bias_rad is not None:
         offsets += f", azimuth offset {math.degrees(one.azimuth_bias_rad):+.2f} degrees"
+        offsets += "" if one.takes_azimuth else " (which no step takes)"
     left = "of the crest" if one.zeros_s else "of ranges"
     return f"{offsets}, scatter {left} {one.range_scatter_m:.4f} m"
 

@@ -257,7 +257,7 @@ class Pipeline:
         maker = next(step for step in steps if "detections" in registry.load_plugin("stages", step.use).produces)
         return self.arriving(capture, maker.label)
 
-    def arriving(self, capture: Capture, label: str) -> Iterator[Block]:
+    def arriving(self, capture: Capture, label: str, *, sts: bool = False) -> Iterator[Block]:
         """Blocks as a step finds them; neither it nor those behind it are opened.
 
         Parameters
@@ -265,6 +265,8 @@ class Pipeline:
         capture : Capture
         label : str
             Of the step.
+        sts : bool
+            Read STS responses even if no step before it needs them.
 
         Yields
         ------
@@ -272,7 +274,7 @@ class Pipeline:
         """
         steps, _ = self._opened(capture, label)
         stream = Stream(steps, [])
-        for frames in capture.blocks(BATCH_FRAMES, sts="sts" in stream.needs):
+        for frames in capture.blocks(BATCH_FRAMES, sts=sts or "sts" in stream.needs):
             yield stream.through(Block(frames.without_invalid()))
         yield from stream.tails()
 

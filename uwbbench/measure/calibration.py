@@ -44,8 +44,8 @@ class Calibration:
     range_sd_m : float
         How sure the offset is: its standard deviation. NaN where that is not known.
     zeros_s : mapping
-        Delay of the direct path behind its crest by response, where it was measured itself; the offsets then replace
-        those of the detector, and else are added to them.
+        Delay of the direct path behind the detector's first path by response, where it was measured itself; the
+        offsets then replace those of the detector, and else are added to them.
     """
 
     range_bias_m: float
@@ -65,14 +65,19 @@ class Calibration:
         Raises
         ------
         ConfigError
-            If not exactly one step takes an offset off the range or off the azimuth, or nothing can be added to what
-            it takes off: a preset instead of a number, say, or an offset of the phase difference.
+            If not exactly one step takes an offset off the range, or several one off the azimuth, or nothing can be
+            added to what one takes off: a preset instead of a number, say, or an offset of the phase difference.
         """
         by_response = self._of_responses()
         settings = by_response or self._added("range_m", self.range_bias_m)
-        return (
-            settings if self.azimuth_bias_rad is None else settings | self._added("azimuth_rad", self.azimuth_bias_rad)
-        )
+        if self.azimuth_bias_rad is None or not self.takes_azimuth:
+            return settings
+        return settings | self._added("azimuth_rad", self.azimuth_bias_rad)
+
+    @property
+    def takes_azimuth(self) -> bool:
+        """Whether some step takes an offset off the azimuth; without one it stays."""
+        return bool(self._changes("azimuth_rad", 0.0))
 
     def _of_responses(self) -> dict[str, float]:
         """Values by path where steps of the detector take the zeros of responses; they leave the range no offset."""

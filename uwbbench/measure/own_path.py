@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -131,20 +131,16 @@ def calibrate_zero(detector: Pipeline, capture: Capture, pulse: PulseShape | Non
         if path.doubt and (path is preamble or _takes(detector, capture, path.response)):
             raise ScoringError(f"capture '{capture.name}', receiver '{path.receiver}', {path.response}: {path.doubt}")
     assert preamble.located is not None  # noqa: S101 - there is a doubt without
-    direct = DirectPath(capture.radar)
-    late = []
-    for block in _located_blocks(detector, capture):
-        every = _every(len(block.frames))
-        for samples, first_path in zip(block.frames.preamble[every], block.part("first_path")[every], strict=True):
-            found = direct.aligned(samples)
-            if found is not None and np.isfinite(first_path):
-                late.append(found[0] - first_path)
-    if not late:
+    late_s = _late_s(detector, capture, [path.response for path in own])
+    if "preamble" not in late_s:
         raise ScoringError(f"detector '{detector.name}' found no first path on capture '{capture.name}'")
-    off_s = float(np.median(late)) * capture.radar.sample_interval_s + preamble.located.delay_s
-    zeros_s = {path.response: path.located.delay_s for path in own if path.located is not None and not path.doubt}
+    zeros_s = {
+        path.response: late_s[path.response] + path.located.delay_s
+        for path in own
+        if path.located is not None and not path.doubt and path.response in late_s
+    }
     return Calibration(
-        range_bias_m=off_s * SPEED_OF_LIGHT_M_S / 2,
+        range_bias_m=zeros_s["preamble"] * SPEED_OF_LIGHT_M_S / 2,
         azimuth_bias_rad=None,
         n=preamble.frames,
         stages=stages_of(detector, capture.radar),
@@ -160,11 +156,28 @@ def _takes(detector: Pipeline, capture: Capture, response: str) -> bool:
     return any(stage.recalibrated(f"{response}_delay_s", 0.0) for stage in stages)
 
 
+def _late_s(detector: Pipeline, capture: Capture, responses: Sequence[str]) -> dict[str, float]:
+    """Median delay of the crest of each response behind the detector's first path, in the frames it is given."""
+    direct = DirectPath(capture.radar)
+    late: dict[str, list[float]] = {name: [] for name in responses}
+    for block in _located_blocks(detector, capture):
+        every = _every(len(block.frames))
+        for name in responses:
+            for samples, first_path in zip(
+                getattr(block.frames, name)[every], block.part("first_path")[every], strict=True
+            ):
+                found = direct.aligned(samples)
+                if found is not None and np.isfinite(first_path):
+                    late[name].append(found[0] - first_path)
+    interval_s = capture.radar.sample_interval_s
+    return {name: float(np.median(taps)) * interval_s for name, taps in late.items() if taps}
+
+
 def _located_blocks(detector: Pipeline, capture: Capture) -> Iterator[Block]:
-    """Blocks behind the step that gives the first path."""
+    """Blocks behind the step that gives the first path, with all responses."""
     for step, after in pairwise(detector.config.steps):
         if "first_path" in registry.load_plugin("stages", step.use).produces:
-            return detector.arriving(capture, after.label)
+            return detector.arriving(capture, after.label, sts=capture.radar.has_sts)
     raise ConfigError(f"detector '{detector.name}' has no step that gives a first path")
 
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from uwbbench.api import BoolArray, FloatArray, compiled, inlined
+from uwbbench.api import BoolArray, FloatArray, compiled
 from uwbbench_detectors.first_path.template_loops import COUNT, PATH_M, path_since
 
 MEMORY, STEP_M = range(2)

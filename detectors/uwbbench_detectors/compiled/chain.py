@@ -174,9 +174,10 @@ def _audible(chain: Chain, stage: SnrFilter) -> bool:
 
 def _phase(chain: Chain, stage: Pdoa) -> bool:
     p = stage.params
-    if p.sample == "fractional" or p.phase != "atan2" or p.reference != "none" or Interpolate in chain:
+    if p.sample == "fractional" or p.phase != "atan2" or p.reference == "direct" or Interpolate in chain:
         return False
     chain.how[[at.PHASED, at.ALIGNED, at.WRAPPED_ABOVE]] = 1, p.sample == "aligned", p.wrap == "closed_above"
+    chain.limits[at.PDOA_OFFSET] = stage.expected_rad
     chain.columns.append("pdoa_rad")
     return True
 

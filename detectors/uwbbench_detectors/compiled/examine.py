@@ -73,7 +73,8 @@ def _examine(
         taps = (float(tap), float(tap))
         if how[at.ALIGNED]:
             taps = (signal.path1 + (tap - signal.path), signal.path2 + (tap - signal.path))
-        pdoa = phase_difference(responses1, responses2, signal.row, taps, how[at.WRAPPED_ABOVE] == 1)
+        above, offset_rad = how[at.WRAPPED_ABOVE] == 1, limits[at.PDOA_OFFSET]
+        pdoa = phase_difference(responses1, responses2, signal.row, taps, above, offset_rad)
         size, largest = abs(pdoa), limits[at.LARGEST_PDOA]
         if math.pi - size < NEAR or abs(size - largest) < NEAR:
             return UNDECIDED

@@ -63,6 +63,7 @@ RANGED_NONE, RANGED_EXACT, RANGED_SINE = range(3)
     GAIN_DB,  # a unit of delay
     DELAY_UNIT,  # units of delay in a tap
     LARGEST_PDOA,
+    PDOA_OFFSET,  # what the geometry adds to responses that are relative to their direct paths
     SINE_DIVISOR,  # phase difference over the argument of the arcsine
     ANGLE_DIVISOR,  # arcsine over azimuth
     ANGLE_SIGN,
@@ -78,8 +79,8 @@ RANGED_NONE, RANGED_EXACT, RANGED_SINE = range(3)
     MOUNT_X,
     MOUNT_Y,
     MOUNT_YAW,
-) = range(26)
-LIMITS = 26
+) = range(27)
+LIMITS = 27
 
 # Whole numbers counted on from call to call: frames by which the noise was judged, and the suspicious ones of them.
 JUDGED, SUSPICIOUS = range(2)

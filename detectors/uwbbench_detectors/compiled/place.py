@@ -25,7 +25,9 @@ def _phase(samples: Any, row: int, tap: float) -> float:
 
 
 @compiled
-def phase_difference(first: Any, second: Any, row: int, taps: tuple[float, float], wrapped_above: bool) -> float:
+def phase_difference(
+    first: Any, second: Any, row: int, taps: tuple[float, float], wrapped_above: bool, offset_rad: float
+) -> float:
     """Phase of the second response of a row less that of the first, each at its own tap, wrapped.
 
     Parameters
@@ -36,13 +38,15 @@ def phase_difference(first: Any, second: Any, row: int, taps: tuple[float, float
         Where the first and the second response are read, each at the nearest sample.
     wrapped_above : bool
         Wrap into (-pi, pi] instead of [-pi, pi).
+    offset_rad : float
+        Added before it is wrapped.
 
     Returns
     -------
     float
         Radians; NaN where a tap lies outside the window, or its sample is zero.
     """
-    alpha = _phase(second, row, taps[1]) - _phase(first, row, taps[0])
+    alpha = _phase(second, row, taps[1]) - _phase(first, row, taps[0]) + offset_rad
     if wrapped_above:
         alpha = -alpha
     wrapped = (alpha + math.pi) % (2 * math.pi) - math.pi

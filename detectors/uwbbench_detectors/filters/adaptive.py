@@ -93,7 +93,7 @@ class AdaptiveFilter(Filter[AdaptiveFilterParams]):
       The rate holds at each delay, however the floor decays, where it is diffuse; ringing that is the same in all
       frames passes less often. As an echo reaches its crest at a delay when the robot has moved for half its length,
       the frames of the last ``1.5 c / (2 B)`` of way are left out, B the bandwidth: what arrives does not hide itself.
-      What keeps its delay over the way that the history is long, such as a wall that the robot drives along, does.
+      What keeps its delay for more than a quarter of the history, such as a wall that the robot drives along, does.
     * Against the law of distance: ``A >= A_direct 10^(least_echo_db / 20) (1 m / R)^(1 or 2)``, with R half the way of
       the delay.
 

@@ -180,11 +180,11 @@ class AngleCostFilterParams(Params):
     """Largest disagreement."""
 
     maximum: float = Field(
-        1.5,
+        3.84,
         ge=0,
         description="Sum of the squared deviations of Doppler and phase difference from those of one direction, in "
-        "standard deviations: of two measurements of one unknown, below 1.5 in 78 % of honest echoes by chance, in more "
-        "where the assumed errors are wide.",
+        "standard deviations: two measurements of one unknown leave chi squared of one degree, which honest echoes "
+        "exceed 3.84 in one case of 20.",
     )
 
 
@@ -199,10 +199,10 @@ class ReflectionFilterParams(Params):
     """Weakest mirror."""
 
     minimum_db: float = Field(
-        -16.0,
-        description="Amplitude relative to that of a perfect mirror. Plaster and wood reflect -8 to -15 dB, and what is "
-        "smaller than the first Fresnel zone less; isolation between the antennas adds to all amplitudes, 6 to 12 dB on "
-        "the robots that are known.",
+        -18.0,
+        description="Amplitude relative to that of a perfect mirror. Plaster and wood reflect -8 to -15 dB, what is "
+        "smaller than the first Fresnel zone less; isolation between the antennas adds to all amplitudes, 6 to 12 dB "
+        "on the robots that are known.",
     )
 
 
@@ -223,7 +223,9 @@ class ReflectionFilter(Filter[ReflectionFilterParams]):
         """Look up the baseline."""
         super().open(radar)
         if radar.baseline_length_m == 0:
-            self.note("filter.reflection left out: transmitter and receiver are in one place, and no baseline scales it")
+            self.note(
+                "filter.reflection left out: transmitter and receiver are in one place, and no baseline scales it"
+            )
         self.least = radar.baseline_length_m / 2 * 10 ** (self.params.minimum_db / 20)
 
     def keep(self, block: Block) -> BoolArray:

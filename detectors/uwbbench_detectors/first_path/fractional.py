@@ -59,7 +59,7 @@ def moved(padded: Any, tap: float, table: Any, start: int, stop: int, made: Any)
     made : (2, taps) float32 array
         Written from ``start`` to ``stop``.
     """
-    whole = int(math.floor(tap))
+    whole = math.floor(tap)
     phase = int((tap - whole) * PHASES + 0.5)
     first = whole - (LENGTH // 2 - 1) + PAD
     for part in range(2):
@@ -83,7 +83,7 @@ def power_between(padded: Any, tap: float, table: Any) -> float:
     tap : float
     table : (PHASES + 1, LENGTH) float32 array
     """
-    whole = int(math.floor(tap))
+    whole = math.floor(tap)
     phase = int((tap - whole) * PHASES + 0.5)
     first = whole - (LENGTH // 2 - 1) + PAD
     real = imaginary = np.float32(0)

@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 from pydantic import Field
 
-from uwbbench.api import Block, ConfigError, FloatArray, Params, Radar, Stage, ports
+from uwbbench.api import Block, ConfigError, FloatArray, Radar, Stage, ports
 from uwbbench_detectors.integrate.motion import MotionParams, places_m, plain
 
 

@@ -15,7 +15,7 @@ from uwbbench.api import (
     ConfigError,
     Detections,
     FloatArray,
-    Frames,
+    IntArray,
     Radar,
     Stage,
     ports,
@@ -32,6 +32,8 @@ HISTORY = 256
 
 
 MOST_STRETCHES = 256
+MOST_FLOODS = 8
+"""Looks that may be passed over in a row because they are flooded; a level that stays is the level."""
 
 
 class BackprojectionParams(MotionParams):
@@ -64,7 +66,7 @@ class BackprojectionParams(MotionParams):
     aspect_deg: float = Field(
         30.0,
         gt=0,
-        description="An object is one face within this angle: evidence is forgotten over the way in which it turns so far.",
+        description="An object is one face within this angle: evidence is forgotten over the way that turns it so far.",
     )
     second: bool = Field(
         True,
@@ -113,12 +115,13 @@ class Backprojection(Stage[BackprojectionParams]):
     object that moves does not add up.
 
     In noise alone the sum of n stretches is Gamma distributed, from which the threshold of the evidence follows
-    (:func:`thresholds`). Local maxima above that are crests. A weaker crest is an object only if it stands above what the response of every stronger
-    one is at its place, worked out from the looks themselves: this takes away the rings through an object that is seen
-    from one side alone, its mirror image beyond a straight way, and the side lobes in range and angle.
+    (:func:`thresholds`). Local maxima above that are crests. A crest is an object only if no stronger object lies
+    within the width of an object, and if it stands above what the responses of the stronger ones may be at its place,
+    worked out from the looks themselves. This takes away the rings through an object that is seen from one side alone,
+    its mirror image beyond a straight way, and the side lobes in range and angle.
 
     One row for each object in view of a frame: ``range_m`` and ``azimuth_rad`` from its receiver, ``x_m`` and ``y_m``,
-    ``amplitude``, the square root of the evidence, and ``score_db``, the evidence in dB. The place lies between cells, by
+    ``amplitude``, the square root of the evidence, and ``score_db``, the evidence in dB. Places lie between cells, by
     parabolas through logarithms. Heights are not known: along a straight way distances from it are slant distances,
     and ranges exact; after a turn an object h higher than the radar lies ``h^2 / (2 R)`` too far.
 
@@ -177,6 +180,7 @@ class Backprojection(Stage[BackprojectionParams]):
             loops.DIRECT_SINE: radar.baseline_m[1] / radar.baseline_length_m if radar.baseline_length_m > 0 else 0.0,
             loops.WIDE_M: p.object_size_m,
             loops.BAND_PER_M: radar.bandwidth_hz / SPEED_OF_LIGHT_M_S,
+            loops.NOISE: -math.log(p.false_alarm_rate),
             loops.MARGIN: 10 ** (p.sidelobe_margin_db / 10),
         }
         self._loops = loops
@@ -188,6 +192,9 @@ class Backprojection(Stage[BackprojectionParams]):
         self._cells: FloatArray = np.zeros((size, size, loops.FIELDS))
         self._owner = np.full((2, size), np.iinfo(np.int64).min)
         self._log_levels: FloatArray = np.full((2, radar.taps), np.nan)
+        self._ceilings: FloatArray = np.full((2, radar.taps), np.inf)
+        self._floods = 0
+        self._reach = math.ceil(1 / (radar.bandwidth_hz * radar.sample_interval_s))
         self._half = round(p.level_pulses / (radar.bandwidth_hz * radar.sample_interval_s))
         self._step_m = wave_m / LOOKS_PER_WAVELENGTH
         self._origin_m: FloatArray | None = None
@@ -196,14 +203,14 @@ class Backprojection(Stage[BackprojectionParams]):
         self._history: FloatArray = np.zeros((0, loops.LOOK))
         self._objects: FloatArray = np.zeros((0, 3))
         self._waiting: list[tuple[FloatArray, FloatArray]] = []
-        self._frames: Frames | None = None
+        self._last: Block | None = None
         turn = radar.center_frequency_hz * radar.sample_interval_s if radar.samples == "rf" else 0.0
         self._to_baseband = np.exp(-2j * np.pi * turn * np.arange(radar.taps))
 
     def step(self, block: Block) -> Block:
         """Block with the objects in view of each frame; without rows where they come out at the end."""
         frames = block.frames
-        self._frames = frames
+        self._last = block.cut(len(frames), len(frames))
         second = frames.sts2 if self.params.second else None
         if second is None:
             self._at[self._loops.ARRAY_RAD] = 0.0
@@ -218,11 +225,11 @@ class Backprojection(Stage[BackprojectionParams]):
             known, poses, looks = [], poses[:0], looks[:0]
         else:
             looks = looks[usable]
-        return block.replace(detections=self._rows(poses, looks, known, (frames.first, usable)))
+        return block.replace(detections=self._rows(poses, looks, known, frames.index[frames.valid]))
 
     def flush(self) -> Block | None:
         """All frames, with the objects of the whole way, where they were held back."""
-        if self._frames is None:
+        if self._last is None:
             return None
         if not self._count:
             self.note(
@@ -234,15 +241,27 @@ class Backprojection(Stage[BackprojectionParams]):
         poses = np.concatenate([each for each, _ in self._waiting])
         looks = np.concatenate([each for _, each in self._waiting])
         self._search(None)
-        none = self._frames.part(len(self._frames), len(self._frames))
-        rows = self._rows(poses, looks, [self._objects] * len(poses), (none.first, np.zeros(0, bool)))
-        return Block(none, detections=rows)
+        rows = self._rows(poses, looks, [self._objects] * len(poses), self._last.frames.index)
+        return self._last.replace(detections=rows)
+
+    def evidence(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Map as it is: x (n,) and y (n,) of its columns and rows in the world, and evidence (n, n), row by row."""
+        loops, cells = self._loops, self._cells
+        power = cells[..., loops.REAL] ** 2 + cells[..., loops.IMAGINARY] ** 2
+        running = np.where(cells[..., loops.LOOKS] > 0, power / np.maximum(cells[..., loops.LOOKS], 1) - 1, 0.0)
+        closed = cells[..., loops.CLOSED] - cells[..., loops.STRETCHES]
+        order = np.argsort(self._owner, axis=1)
+        origin_m = np.zeros(2) if self._origin_m is None else self._origin_m
+        x_m, y_m = (np.sort(self._owner, axis=1) + 0.5) * self._at[loops.CELL_M] + origin_m[:, None]
+        return x_m, y_m, (running + closed)[order[1]][:, order[0]]
 
     def _looks_of(self, block: Block) -> tuple[FloatArray, FloatArray, BoolArray]:
         """Looks (frames, LOOK), headings of boresight (frames,), and which frames can be used."""
         loops, radar, frames = self._loops, self.radar, block.frames
         place_m, yaw_rad = places_m(self, frames)
-        receiver_m, boresight_rad = receiver_pose(place_m, yaw_rad, np.asarray(radar.mount_position_m), radar.mount_yaw_rad)
+        receiver_m, boresight_rad = receiver_pose(
+            place_m, yaw_rad, np.asarray(radar.mount_position_m), radar.mount_yaw_rad
+        )
         transmitter_m = place_m + rotate_z(np.asarray(radar.tx_position_m), yaw_rad)
         zero = block.part("first_path")
         usable = frames.valid & np.isfinite(receiver_m).all(axis=1) & np.isfinite(boresight_rad) & np.isfinite(zero)
@@ -264,20 +283,23 @@ class Backprojection(Stage[BackprojectionParams]):
         moved_m = math.hypot(look[loops.RX_X] - self._last_m[0], look[loops.RX_Y] - self._last_m[1])
         if moved_m < self._step_m:
             return
+        taken = [np.asarray(each, np.complex128) * self._to_baseband for each in (samples, second) if each is not None]
+        self._floods = self._floods + 1 if loops.flooded(taken[0], self._log_levels[0]) else 0
+        if 0 < self._floods <= MOST_FLOODS:
+            return
         first = math.isnan(moved_m)
+        breaks = look[loops.BREAKS] = not first and moved_m > LOOKS_PER_WAVELENGTH / 4 * self._step_m
+        if moved_m * self._at[loops.TAPS_PER_M] * 2 > self._reach:
+            self._ceilings[:] = np.inf
         self._way_m += 0.0 if first else moved_m
         self._last_m = look[[loops.RX_X, loops.RX_Y]]
         look[loops.WAY_M] = self._way_m
         self._count += 1
-        memory = max(self._at[loops.FORGET_M] / self._step_m, 1.0)
-        share = 1 / min(self._count, memory)
+        share = 1 / min(self._count, max(self._at[loops.FORGET_M] / self._step_m, 1.0))
         scaled = [
-            loops.in_units_of_noise(
-                np.asarray(each, np.complex128) * self._to_baseband, self._log_levels[place], share, self._half
-            )
-            for place, each in enumerate((samples,) if second is None else (samples, second))
+            loops.in_units_of_noise(each, level, share, self._half, ceiling, self._reach)
+            for each, level, ceiling in zip(taken, self._log_levels, self._ceilings, strict=False)
         ]
-        breaks = look[loops.BREAKS] = not first and moved_m > LOOKS_PER_WAVELENGTH / 4 * self._step_m
         loops.add_look(self._cells, self._owner, scaled[0], scaled[-1], look, self._at)
         if breaks or self._count % 2:
             self._history = np.concatenate([self._history[-HISTORY + 1 :], look[None]])
@@ -295,9 +317,7 @@ class Backprojection(Stage[BackprojectionParams]):
         found = self._loops.crests(self._cells, self._owner, look, at, self._thresholds)
         self._objects = self._loops.objects_among(found, self._history, self._at, self.params.most)
 
-    def _rows(
-        self, poses: FloatArray, looks: FloatArray, known: list[FloatArray], processed: tuple[int, BoolArray]
-    ) -> Detections:
+    def _rows(self, poses: FloatArray, looks: FloatArray, known: list[FloatArray], processed: IntArray) -> Detections:
         """Rows of the objects known in each frame that are in its view."""
         loops, at = self._loops, self._at
         counts = [len(each) for each in known]
@@ -307,12 +327,14 @@ class Backprojection(Stage[BackprojectionParams]):
         off_m = place_m - looks[of][:, [loops.RX_X, loops.RX_Y]]
         range_m = np.hypot(off_m[:, 0], off_m[:, 1])
         ahead = np.sum(off_m * looks[of][:, [loops.AHEAD_X, loops.AHEAD_Y]], axis=1)
-        seen = (range_m >= at[loops.NEAREST_M]) & (range_m <= at[loops.FARTHEST_M]) & (ahead >= at[loops.VIEW] * range_m)
+        seen = (
+            (range_m >= at[loops.NEAREST_M]) & (range_m <= at[loops.FARTHEST_M]) & (ahead >= at[loops.VIEW] * range_m)
+        )
         azimuth_rad = np.arctan2(off_m[:, 1], off_m[:, 0]) - poses[of, 1]
         origin_m = np.zeros(2) if self._origin_m is None else self._origin_m
         rows = Detections(
             poses[of, 0].astype(np.int64),
-            processed=processed[0] + np.flatnonzero(processed[1]) if not self.params.smoothed else poses[:, 0],
+            processed=processed,
             range_m=range_m,
             azimuth_rad=np.asarray((azimuth_rad + np.pi) % (2 * np.pi) - np.pi),
             amplitude=np.sqrt(evidence),

@@ -9,7 +9,8 @@ import numpy as np
 from uwbbench.api import ComplexArray, FloatArray, IntArray, compiled, inlined
 
 REAL, IMAGINARY, LOOKS, BEGAN_M, CLOSED, STRETCHES = range(6)
-"""Of a cell: coherent sum of its stretch, looks in it and where on the way it began; evidence and number of those before."""
+"""Of a cell: coherent sum of its stretch, looks in it and where on the way it began; evidence and number of those
+before."""
 FIELDS = 6
 
 TX_X, TX_Y, RX_X, RX_Y, AHEAD_X, AHEAD_Y, ZERO, WAY_M, BREAKS = range(9)
@@ -17,40 +18,54 @@ TX_X, TX_Y, RX_X, RX_Y, AHEAD_X, AHEAD_Y, ZERO, WAY_M, BREAKS = range(9)
 whether the look before lies too far away to be added in phase."""
 LOOK = 9
 
-(
-    CELL_M,
-    TAPS_PER_M,
-    TURN_PER_M,
-    NEAREST_M,
-    FARTHEST_M,
-    VIEW,
-    LONGEST_M,
-    STRETCH_PER_M,
-    FORGET_M,
-    FORGET_PER_M,
-    BAND_PER_M,
-    MARGIN,
-    ARRAY_RAD,
-    DIRECT_SINE,
-    WIDE_M,
-) = range(15)
-"""Settings: cell; taps and phase a metre of path; ranges; cosine of half the field of view; longest stretch, and a metre
-of range; way over which evidence is forgotten, at most and a metre of range; bandwidth over the speed of light; how far a side lobe
-may exceed what is expected of it; phase between two antennas at a sine of 1, 0 of one alone; sine of the direct path; width of an object."""
-SETTINGS = 15
+CELL_M, TAPS_PER_M, TURN_PER_M, BAND_PER_M, WIDE_M = range(5)
+"""Settings: cell; taps and phase a metre of path; bandwidth over the speed of light; width of an object."""
+NEAREST_M, FARTHEST_M, VIEW = range(5, 8)
+"""Range of cells; cosine of half the field of view."""
+LONGEST_M, STRETCH_PER_M, FORGET_M, FORGET_PER_M = range(8, 12)
+"""Way of a stretch at most, and a metre of range; the same of the way over which evidence is forgotten."""
+MARGIN, NOISE, ARRAY_RAD, DIRECT_SINE = range(12, 16)
+"""How far a side lobe may exceed what is expected of it; what noise alone may reach; phase between two antennas at a
+sine of 1, 0 of one alone; sine of the direct path."""
+SETTINGS = 16
 
 EULER = 0.5772156649015329
 ROOT_HALF = math.sqrt(0.5)
+TEN_DB = math.log(10)
 CANDIDATES = 256
 """Crests that are looked at, strongest first."""
 
 
 @compiled
-def in_units_of_noise(samples: ComplexArray, log_level: FloatArray, weight: float, half: int) -> ComplexArray:
+def flooded(samples: ComplexArray, log_level: FloatArray) -> bool:
+    """Whether the power of a look lies 10 dB above that of the looks so far, by the mean of logarithms over the taps.
+
+    Parameters
+    ----------
+    samples : (taps,) complex array
+    log_level : (taps,) array
+        As of :func:`in_units_of_noise`.
+    """
+    rise, known = 0.0, 0
+    for tap in range(len(samples)):
+        height = math.hypot(samples[tap].real, samples[tap].imag)
+        if height > 0 and not math.isnan(log_level[tap]):
+            rise += 2 * math.log(height) - log_level[tap]
+            known += 1
+    return rise > TEN_DB * known
+
+
+@compiled
+def in_units_of_noise(
+    samples: ComplexArray, log_level: FloatArray, weight: float, half: int, ceiling: FloatArray, reach: int
+) -> ComplexArray:
     """Divide a look by the level of noise and clutter, from the mean logarithm of the power of looks and taps around.
 
     The power of complex noise of mean s is distributed exponentially, and the mean of its logarithm is
     ``ln s - 0.5772``. Unlike a mean of powers it is hardly raised by the few taps that hold an echo.
+
+    An echo comes nearer by less than a tap from look to look, and does not grow by more than 6 dB. What exceeds both
+    that and 12 dB above the noise is a burst, and is cut down to it.
 
     Parameters
     ----------
@@ -60,7 +75,11 @@ def in_units_of_noise(samples: ComplexArray, log_level: FloatArray, weight: floa
     weight : float
         Of this look in the running mean.
     half : int
-        Taps to each side.
+        Taps to each side that the level is taken from.
+    ceiling : (taps,) array
+        Magnitudes of the look before, carried on; infinite where there was none.
+    reach : int
+        Taps that an echo may have moved.
 
     Returns
     -------
@@ -76,12 +95,20 @@ def in_units_of_noise(samples: ComplexArray, log_level: FloatArray, weight: floa
         seen = not math.isnan(log_level[tap])
         total[tap + 1] = total[tap] + (log_level[tap] if seen else 0.0)
         known[tap + 1] = known[tap] + seen
-    scaled = np.zeros_like(samples)
+    scaled, heights = np.zeros_like(samples), np.zeros(taps)
     for tap in range(taps):
         low, high = max(tap - half, 0), min(tap + half + 1, taps)
         if known[high] > known[low]:
             mean = (total[high] - total[low]) / (known[high] - known[low])
             scaled[tap] = samples[tap] * math.exp(-0.5 * (mean + EULER))
+        heights[tap] = math.hypot(scaled[tap].real, scaled[tap].imag)
+        most = 4.0
+        for near in range(max(tap - reach, 0), min(tap + reach + 1, taps)):
+            most = max(most, 2 * ceiling[near])
+        if heights[tap] > most:
+            scaled[tap] *= most / heights[tap]
+            heights[tap] = most
+    ceiling[:] = heights
     return scaled
 
 
@@ -89,7 +116,8 @@ def in_units_of_noise(samples: ComplexArray, log_level: FloatArray, weight: floa
 def path_m(x: float, y: float, look: FloatArray) -> float:
     """Path from the transmitter over a point to the receiver of a look."""
     to_x, to_y, from_x, from_y = x - look[TX_X], y - look[TX_Y], x - look[RX_X], y - look[RX_Y]
-    return math.sqrt(to_x * to_x + to_y * to_y) + math.sqrt(from_x * from_x + from_y * from_y)
+    path: float = math.sqrt(to_x * to_x + to_y * to_y) + math.sqrt(from_x * from_x + from_y * from_y)
+    return path
 
 
 @inlined
@@ -105,7 +133,8 @@ def seen_range_m(x: float, y: float, look: FloatArray, at: FloatArray) -> float:
 @inlined
 def sine_of(x: float, y: float, range_m: float, look: FloatArray) -> float:
     """Sine of the azimuth of a point at a range, positive to the left."""
-    return (look[AHEAD_X] * (y - look[RX_Y]) - look[AHEAD_Y] * (x - look[RX_X])) / range_m
+    sine: float = (look[AHEAD_X] * (y - look[RX_Y]) - look[AHEAD_Y] * (x - look[RX_X])) / range_m
+    return sine
 
 
 @inlined
@@ -114,7 +143,9 @@ def at_tap(samples: ComplexArray, tap: float) -> complex:
     k = int(tap)
     f = tap - k
     a, b, c, d = samples[k - 1], samples[k], samples[k + 1], samples[k + 2]
-    return b + f * (0.5 * (c - a) + f * (a - 2.5 * b + 2 * c - 0.5 * d + f * (1.5 * (b - c) + 0.5 * (d - a))))
+    curved = a - 2.5 * b + 2 * c - 0.5 * d + f * (1.5 * (b - c) + 0.5 * (d - a))
+    sample: complex = b + f * (0.5 * (c - a) + f * curved)
+    return sample
 
 
 @compiled
@@ -158,7 +189,7 @@ def add_look(
     """
     size, taps = len(cells), len(samples)
     for axis in range(2):
-        move_window(cells, owner[axis], int(math.floor(look[RX_X + axis] / at[CELL_M])), axis == 0)
+        move_window(cells, owner[axis], math.floor(look[RX_X + axis] / at[CELL_M]), axis == 0)
     for row in range(size):
         y = (owner[1, row] + 0.5) * at[CELL_M]
         for column in range(size):
@@ -189,7 +220,7 @@ def add_look(
             cell[LOOKS] += 1.0
 
 
-@inlined
+@compiled
 def between(before: float, here: float, after: float) -> float:
     """Place of a crest between cells, by a parabola through logarithms, or through values that have none."""
     if before > 0 and after > 0:
@@ -199,9 +230,7 @@ def between(before: float, here: float, after: float) -> float:
 
 
 @compiled
-def crests(
-    cells: FloatArray, owner: IntArray, look: FloatArray, at: FloatArray, thresholds: FloatArray
-) -> FloatArray:
+def crests(cells: FloatArray, owner: IntArray, look: FloatArray, at: FloatArray, thresholds: FloatArray) -> FloatArray:
     """Find the crests of the map that noise does not explain, in view of a look.
 
     Parameters
@@ -216,7 +245,7 @@ def crests(
     Returns
     -------
     (crests, 3) array
-        x, y and evidence; strongest first.
+        x, y and evidence.
     """
     size = len(cells)
     value = np.empty((size, size))
@@ -246,16 +275,19 @@ def crests(
             x = owner[0, column] + 0.5 + between(value[row, column - 1], here, value[row, right])
             y = owner[1, row] + 0.5 + between(value[row - 1, column], here, value[up, column])
             if seen_range_m(x * at[CELL_M], y * at[CELL_M], look, at) >= 0:
-                found[count] = x * at[CELL_M], y * at[CELL_M], here
+                found[count, 0], found[count, 1], found[count, 2] = x * at[CELL_M], y * at[CELL_M], here
                 count += 1
-    return found[np.argsort(-found[:count, 2], kind="mergesort")]
+    return found[:count].copy()
 
 
 @compiled
 def explained(point: FloatArray, strong: FloatArray, looks: FloatArray, at: FloatArray) -> float:
-    """Share of the evidence of a point object that turns up at another point.
+    """Share of the evidence of a point object that may turn up at another point.
 
-    The looks are added up as they were, with the pulse ``(1 + (pi B t)^2)^(-1/2)``, the envelope of that of a flat band.
+    Of a look, the pulse leaves ``1 / (1 + (pi B t)^2)`` of the power, the envelope of that of a flat band, at the delay
+    t between the two, and two antennas ``cos^2`` of half the difference of their phases. Over a stretch in which the
+    difference of the two paths turns the phase by 2 x, the sum falls as ``(sin x / x)^2``, of which the envelope is
+    taken too, ``1 / (1 + x^2 / 3)``: where the zeros lie hangs on a hundredth of a wavelength.
 
     Parameters
     ----------
@@ -263,46 +295,54 @@ def explained(point: FloatArray, strong: FloatArray, looks: FloatArray, at: Floa
         The other point, and the object.
     looks : (n, LOOK) array
     at : (SETTINGS,) array
+
+    Returns
+    -------
+    float
+        At most 1.
     """
-    real = imaginary = count = began_m = power = total = 0.0
-    for index in range(len(looks)):
-        look = looks[index]
+    share = total = height = count = began_m = 0.0
+    shortest_m = longest_m = 0.0
+    for index in range(len(looks) + 1):
+        look = looks[min(index, len(looks) - 1)]
         range_m = seen_range_m(point[0], point[1], look, at)
-        if range_m < 0:
+        ends = index == len(looks)
+        if range_m < 0 and not ends:
             continue
-        longest_m = min(at[LONGEST_M], at[STRETCH_PER_M] * range_m)
-        if count > 0 and (look[BREAKS] > 0 or look[WAY_M] - began_m >= longest_m):
-            power += (real * real + imaginary * imaginary) / count
-            total += count
-            real = imaginary = count = 0.0
-        if count == 0:
-            began_m = look[WAY_M]
+        stretch_m = look[WAY_M] - began_m
+        if count > 0 and (ends or look[BREAKS] > 0 or stretch_m >= min(at[LONGEST_M], at[STRETCH_PER_M] * range_m)):
+            turn = 0.5 * at[TURN_PER_M] * (longest_m - shortest_m)
+            kept = math.exp(-stretch_m / min(at[FORGET_M], at[FORGET_PER_M] * abs(range_m)))
+            share = kept * share + height / (1 + turn * turn / 3)
+            total = kept * total + count
+            height = count = 0.0
+        if ends:
+            break
         off_m = path_m(point[0], point[1], look) - path_m(strong[0], strong[1], look)
+        if count == 0:
+            began_m, shortest_m, longest_m = look[WAY_M], off_m, off_m
+        shortest_m, longest_m = min(shortest_m, off_m), max(longest_m, off_m)
         late = math.pi * at[BAND_PER_M] * off_m
-        height = 1 / math.sqrt(1 + late * late)
-        turn = at[TURN_PER_M] * off_m
-        if at[ARRAY_RAD] > 0:  # the mean of two antennas: their phases turn apart by twice the half of the difference
+        power = 1 / (1 + late * late)
+        if at[ARRAY_RAD] > 0:
             other_m = math.hypot(strong[0] - look[RX_X], strong[1] - look[RX_Y])
             sines = sine_of(point[0], point[1], range_m, look) - sine_of(strong[0], strong[1], other_m, look)
-            turn -= 0.5 * at[ARRAY_RAD] * sines
-            height *= math.cos(0.5 * at[ARRAY_RAD] * sines)
-        real += height * math.cos(turn)
-        imaginary += height * math.sin(turn)
+            power *= math.cos(0.5 * at[ARRAY_RAD] * sines) ** 2
+        height += power
         count += 1.0
-    if count > 0:
-        power += (real * real + imaginary * imaginary) / count
-        total += count
-    return power / total if total > 0 else 0.0
+    return share / total if total > 0 else 0.0
 
 
 @compiled
 def objects_among(found: FloatArray, looks: FloatArray, at: FloatArray, most: int) -> FloatArray:
     """Crests that the side lobes of stronger ones do not explain, strongest first.
 
+    Side lobe and noise add in amplitude.
+
     Parameters
     ----------
     found : (crests, 3) array
-        Strongest first.
+        Changed: the evidence of crests that were looked at becomes 0.
     looks : (n, LOOK) array
     at : (SETTINGS,) array
     most : int
@@ -313,14 +353,22 @@ def objects_among(found: FloatArray, looks: FloatArray, at: FloatArray, most: in
     """
     kept = np.empty((most, 3))
     count = 0
-    for index in range(min(len(found), CANDIDATES)):
-        free = count < most
+    for _ in range(min(len(found), CANDIDATES)):
+        best = 0
+        for index in range(len(found)):
+            if found[index, 2] > found[best, 2]:
+                best = index
+        crest, evidence = found[best], found[best, 2]
+        free = True
         for other in range(count):
-            apart_m = math.hypot(found[index, 0] - kept[other, 0], found[index, 1] - kept[other, 1])
-            free &= apart_m >= at[WIDE_M]
-            share = explained(found[index], kept[other], looks, at) if free else 0.0
-            free &= found[index, 2] > at[MARGIN] * share * kept[other, 2]
+            free &= math.hypot(crest[0] - kept[other, 0], crest[1] - kept[other, 1]) >= at[WIDE_M]
+        for other in range(count):
+            lobe = at[MARGIN] * explained(crest, kept[other], looks, at) * kept[other, 2] if free else 0.0
+            free &= math.sqrt(evidence) > math.sqrt(lobe) + math.sqrt(at[NOISE])
         if free:
-            kept[count] = found[index]
+            kept[count, 0], kept[count, 1], kept[count, 2] = crest[0], crest[1], evidence
             count += 1
+        crest[2] = 0.0
+        if count == most:
+            break
     return kept[:count].copy()

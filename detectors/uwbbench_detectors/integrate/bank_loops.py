@@ -289,9 +289,12 @@ def bank_frame(
         known = known and noise_power(second, noise[1]) > 0
     if not known or carried[lay.PATH_M] < at[lay.LEAST_PATH_M]:
         return 0
+    fall = math.exp(-1 / at[lay.FLOOR_TAPS])
     for channel in range(len(per_noise)):
+        traces = at[lay.FLOOR]
         for tap in range(taps):
-            traces = at[lay.FLOOR] * math.exp(-max(tap - at[lay.TO_TAP], 0.0) / at[lay.FLOOR_TAPS])
+            if tap > at[lay.TO_TAP]:
+                traces *= fall
             per_noise[channel, tap] = np.float32(1 / ((noise[channel, 0] + traces) * carried[lay.SQUARES]))
     powers(sums, per_noise, power)
     motion_rad = wrapped(carried[lay.HEADING_RAD] - yaw_rad - at[lay.MOUNT_RAD])

@@ -20,14 +20,14 @@ class DopplerRangeParams(MotionParams):
     """How far frames are added, over which directions, and which sums are rows."""
 
     length_m: float = Field(
-        0.05,
+        0.1,
         gt=0,
         description="Way over which a frame's weight falls by e. The cosine is resolved to wavelength / (4 pi length): "
-        "0.06 at 8 GHz. Longer ways resolve more and suppress noise more, but a target must keep its phase along them: "
+        "0.03 at 8 GHz. Longer ways resolve more and suppress noise more, but a target must keep its phase along them: "
         "not for extended objects near the robot, and not where odometry errs by a tenth of a wavelength within it.",
     )
     cosines: int = Field(
-        17, ge=3, description="Hypotheses of the cosine of the angle between target and motion, evenly from -1 to 1."
+        33, ge=3, description="Hypotheses of the cosine of the angle between target and motion, evenly from -1 to 1."
     )
     false_alarm_rate: float = Field(
         1e-7, gt=0, lt=1, description="Probability that noise alone exceeds the threshold in one cell of the bank."
@@ -35,8 +35,7 @@ class DopplerRangeParams(MotionParams):
     guard_taps: float = Field(1.0, ge=0, description="Rows begin so many taps behind the direct path.")
     second: bool = Field(
         False,
-        description="Add the power of STS2, of the other antenna, and give rows its phase difference. Needs STS; frames "
-        "that fuse.responses has left.",
+        description="Add the power of STS2, of the other antenna, and give rows its phase difference. Needs STS."
     )
     step_m: float = Field(
         0.001, gt=0, description="Least way between two frames that are added. In between, the last rows stay, as held."
@@ -60,7 +59,7 @@ class DopplerRange(Stage[DopplerRangeParams]):
 
     the sum in the frame of a target that comes nearer at the rate u: it adds up in phase for targets in that direction
     and decays as ``1 / (1 + ((u - u') / w)^2)``, ``w = lambda / (4 pi L)``, for others. The weights sum to an effective
-    ``2 L`` of way: 16 frames at 48 a second and 0.3 m/s, 12 dB over one frame. Shifts are of a cubic through four taps.
+    ``2 L`` of way: 32 frames at 48 a second and 0.3 m/s, 15 dB over one frame. Shifts are of a cubic through four taps.
     Aliases appear where the robot moves more than half a wavelength between two frames over the width of the grid:
     beyond ``lambda / 4`` a frame, 0.45 m/s at 48 frames a second and 8 GHz, opposite directions look alike.
 

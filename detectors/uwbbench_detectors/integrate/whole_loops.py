@@ -35,7 +35,7 @@ COLUMNS = lay.COLUMNS + 5
 @inlined
 def some(plane: Any) -> bool:
     """Whether any sample is not zero."""
-    for tap in range(plane.shape[1]):
+    for tap in range(plane.shape[1]):  # noqa: SIM110  (what numba compiles)
         if plane[0, tap] != 0 or plane[1, tap] != 0:
             return True
     return False
@@ -233,13 +233,14 @@ def whole_frames(
         )
         if follows:
             for row in range(count):
-                found[row, fixed.DETECTED_M], found[row, fixed.DETECTED_RAD] = left[row, RANGE_M], left[row, AZIMUTH_RAD]
+                found[row, fixed.DETECTED_M], found[row, fixed.DETECTED_RAD] = (
+                    left[row, RANGE_M],
+                    left[row, AZIMUTH_RAD],
+                )
                 found[row, fixed.DETECTED_AMPLITUDE] = left[row, lay.AMPLITUDE]
                 found[row, fixed.DETECTED_DB] = left[row, lay.SCORE_DB]
                 found[row, fixed.DETECTED_HELD] = left[row, lay.HELD]
-            count = followed(
-                objects, fixed_carried, found[:count], place_m[frame], yaw_rad[frame], at_fixed, rows
-            )
+            count = followed(objects, fixed_carried, found[:count], place_m[frame], yaw_rad[frame], at_fixed, rows)
         if written + count > len(table):
             larger = np.empty((2 * len(table), width))
             larger[:written] = table[:written]

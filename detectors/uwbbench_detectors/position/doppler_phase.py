@@ -20,7 +20,7 @@ class DopplerPhaseParams(Params):
         "directions, and of the odometry's direction.",
     )
     phase_sd_rad: float = Field(
-        0.1, gt=0, description="Error of the phase difference beside noise: antennas whose phase hangs on the direction."
+        0.1, gt=0, description="Error of the phase difference beside noise, as antennas' phases hang on the direction."
     )
     loose_sd_rad: float = Field(
         0.25,
@@ -87,7 +87,7 @@ class DopplerPhase(Stage[DopplerPhaseParams]):
 
         p = self.params
         self._joint_angles = loops.joint_angles
-        self.fan = loops.directions()
+        self.fan = loops.directions(p.behind)
         self.at: FloatArray = np.zeros(loops.SETTINGS)
         self.at[loops.SLOPE] = 2 * np.pi * radar.array_spacing_m / radar.wavelength_m
         self.at[loops.MIDDLE_X], self.at[loops.MIDDLE_Y] = radar.baseline_m[:2] / 2

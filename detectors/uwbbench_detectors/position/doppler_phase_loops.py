@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from uwbbench.api import FloatArray, compiled, inlined
+from uwbbench.api import FloatArray, compiled
 from uwbbench_detectors.position.wrap import wrapped
 
 SLOPE, MIDDLE_X, MIDDLE_Y, TAP_M, BASELINE_M, COSINE_SD, PHASE_SD, LOOSE_SD, BEHIND = range(9)
@@ -18,10 +18,17 @@ NEAREST_M = 0.05
 """Least distance from the middle of the antennas that directions are converted for."""
 
 
-def directions() -> FloatArray:
-    """Cosines and sines (2, STEPS) of the directions that are searched."""
+def directions(behind: float) -> FloatArray:
+    """Cosines, sines and costs (3, STEPS) of the directions that are searched.
+
+    Parameters
+    ----------
+    behind : float
+        Cost of those behind the antennas.
+    """
     angle = -np.pi + 2 * np.pi * np.arange(STEPS) / STEPS
-    return np.ascontiguousarray(np.stack([np.cos(angle), np.sin(angle)]))
+    cosine = np.cos(angle)
+    return np.ascontiguousarray(np.stack([cosine, np.sin(angle), np.where(cosine < 0, behind, 0.0)]))
 
 
 @compiled
@@ -37,7 +44,7 @@ def joint_angle(
         phase difference.
     along : (2,) floats
         Cosine and sine of the direction of the motion.
-    fan : (2, STEPS) array
+    fan : (3, STEPS) array
     at : (SETTINGS,) array
     cost : (STEPS,) array
         Room.
@@ -51,14 +58,15 @@ def joint_angle(
     to_cosine = 1 / math.sqrt(at[COSINE_SD] ** 2 + row[3] ** 2)
     of_noise = 10 ** (-row[1] / 10)
     to_phase = 1 / math.sqrt(at[PHASE_SD] ** 2 + of_noise)
+    cosines, sines, costs = fan[0], fan[1], fan[2]
+    for step in range(STEPS):  # without a branch, so that several directions are worked out at once
+        off = (cosines[step] * along[0] + sines[step] * along[1] - row[2]) * to_cosine
+        x_m, y_m = at[MIDDLE_X] + half_m * cosines[step], at[MIDDLE_Y] + half_m * sines[step]
+        phase = row[5] - at[SLOPE] * y_m / math.sqrt(x_m * x_m + y_m * y_m)
+        phase = (phase - 2 * math.pi * np.floor(phase / (2 * math.pi) + 0.5)) * to_phase
+        cost[step] = off * off + phase * phase + costs[step]
     best, least = 0, np.inf
     for step in range(STEPS):
-        cosine, sine = fan[0, step], fan[1, step]
-        off = (cosine * along[0] + sine * along[1] - row[2]) * to_cosine
-        x_m, y_m = at[MIDDLE_X] + half_m * cosine, at[MIDDLE_Y] + half_m * sine
-        phase = row[5] - at[SLOPE] * y_m / math.sqrt(x_m * x_m + y_m * y_m)
-        phase = wrapped(phase) * to_phase
-        cost[step] = off * off + phase * phase + (at[BEHIND] if cosine < 0 else 0.0)
         if cost[step] < least:
             best, least = step, cost[step]
     before, after = cost[(best - 1) % STEPS], cost[(best + 1) % STEPS]
@@ -81,7 +89,7 @@ def joint_angles(rows: FloatArray, fan: FloatArray, at: FloatArray) -> FloatArra
     ----------
     rows : (n, 6) array
         As :func:`joint_angle` wants each.
-    fan : (2, STEPS) array
+    fan : (3, STEPS) array
     at : (SETTINGS,) array
 
     Returns

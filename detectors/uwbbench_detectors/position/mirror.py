@@ -79,4 +79,5 @@ class MirrorRange(Stage[MirrorRangeParams]):
         rows = block.detections
         delay_s = (rows["tap"] - block.part("first_path")[block.rows]) * self.radar.sample_interval_s
         azimuth_rad = plain(rows["middle_rad" if "middle_rad" in rows.names else "azimuth_rad"], np.float64)
-        return block.with_columns(delay_s=delay_s, range_m=self._mirror_ranges(plain(delay_s, np.float64), azimuth_rad, self.at))
+        range_m = self._mirror_ranges(plain(delay_s, np.float64), azimuth_rad, self.at)
+        return block.with_columns(delay_s=delay_s, range_m=range_m)

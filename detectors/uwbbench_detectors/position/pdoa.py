@@ -80,7 +80,7 @@ class Pdoa(Stage[PdoaParams]):
     def open(self, radar: Radar) -> None:
         """Work out the phase difference that the direct path should have."""
         super().open(radar)
-        self._expected_rad = 0.0 if self.params.reference == "none" else _direct_path_pdoa(radar, self.params.reference)
+        self.expected_rad = 0.0 if self.params.reference == "none" else _direct_path_pdoa(radar, self.params.reference)
 
     def step(self, block: Block) -> Block:
         """Block whose detections carry ``pdoa_rad``."""
@@ -88,7 +88,7 @@ class Pdoa(Stage[PdoaParams]):
         alpha = self._difference(block.frames, rows, block.detections["tap"])
         if self.params.reference == "direct":
             alpha = alpha - self._difference(block.frames, rows, block.part("first_path")[rows])
-        alpha = alpha + self._expected_rad
+        alpha = alpha + self.expected_rad
         wrapped = wrap_angle(alpha) if self.params.wrap == "half_open" else -wrap_angle(-alpha)
         return block.with_columns(pdoa_rad=wrapped)
 

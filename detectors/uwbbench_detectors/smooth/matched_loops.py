@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from uwbbench.api import compiled, inlined
+from uwbbench.api import compiled
 
 
 @compiled

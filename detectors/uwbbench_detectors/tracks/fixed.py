@@ -29,8 +29,16 @@ class FixedTrackParams(MotionParams):
     wander_m: float = Field(0.1, ge=0, description="By which the part that reflects moves, over a metre of way.")
     gate: float = Field(9.0, gt=0, description="Squared distance of a detection from its object, at most.")
     apart_m: float = Field(0.3, ge=0, description="Objects nearer to each other are one.")
-    shadow_m: float = Field(0.15, ge=0, description="Objects so near the line of sight hide weaker ones behind them.")
+    mirror_db: float = Field(
+        3.0,
+        description="An object that reflects so much more than another one, farther away, is taken for a mirror that "
+        "may show it.",
+    )
+    plane_m: float = Field(
+        0.15, ge=0, description="What lies so near the plane of a mirror, or behind it, may be its image, or part of it."
+    )
     view_deg: float = Field(47.0, gt=0, description="Azimuth up to which objects are rows.")
+    looks_deg: float = Field(90.0, gt=0, description="Azimuth up to which an object should be found by a look.")
     near_m: float = Field(0.2, ge=0, description="Range from which on objects are rows.")
     step_m: float = Field(0.001, gt=0, description="Way below which a frame is no look.")
 
@@ -68,7 +76,9 @@ class FixedTrack(Stage[FixedTrackParams]):
             lay.WANDER: p.wander_m**2,
             lay.GATE: p.gate,
             lay.APART_M: p.apart_m,
-            lay.SHADOW_M: p.shadow_m,
+            lay.PLANE_M: p.plane_m,
+            lay.MIRROR: 10 ** (p.mirror_db / 20),
+            lay.LOOKS_RAD: np.deg2rad(p.looks_deg),
             lay.VIEW_RAD: np.deg2rad(p.view_deg),
             lay.NEAR_M: p.near_m,
             lay.FAR_M: radar.window_m,

@@ -147,8 +147,14 @@ def kept(objects: FloatArray, count: int, at: FloatArray) -> int:
 
 
 @inlined
-def hidden(objects: FloatArray, count: int, place: int, at: FloatArray) -> bool:
-    """Whether an object stands behind another one, not weaker, that is shown.
+def least(item: FloatArray, at: FloatArray) -> float:
+    """Log odds from which on an object is shown: more where it is not measured."""
+    return at[lay.SHOWN] if item[lay.NEWS] == 1 else at[lay.HOLDS]
+
+
+@inlined
+def behind_mirror(objects: FloatArray, count: int, place: int, at: FloatArray) -> bool:
+    """Whether an object lies behind the plane of a nearer one that reflects more, and may be its image.
 
     Parameters
     ----------
@@ -159,11 +165,11 @@ def hidden(objects: FloatArray, count: int, place: int, at: FloatArray) -> bool:
     item = objects[place]
     for other in range(count):
         one = objects[other]
-        if other == place or one[lay.EVIDENCE] < at[lay.SHOWN] or one[lay.RANGE] > item[lay.RANGE] - at[lay.APART_M]:
-            continue
-        off_rad = abs(wrapped(one[lay.AZIMUTH] - item[lay.AZIMUTH]))
-        if off_rad < 1.0 and one[lay.RANGE] * math.sin(off_rad) < at[lay.SHADOW_M]:
-            if one[lay.AMPLITUDE] >= item[lay.AMPLITUDE]:
+        nearer = one[lay.RANGE] < item[lay.RANGE] - at[lay.APART_M]
+        stronger = one[lay.AMPLITUDE] >= item[lay.AMPLITUDE] * at[lay.MIRROR]
+        if nearer and stronger and one[lay.EVIDENCE] >= least(one, at):
+            along_m = item[lay.RANGE] * math.cos(one[lay.AZIMUTH] - item[lay.AZIMUTH])
+            if along_m > one[lay.RANGE] - at[lay.PLANE_M]:
                 return True
     return False
 
@@ -223,16 +229,16 @@ def followed(
         for row in range(len(found)):
             found[row, lay.FRAME] = -1.0
         while True:
-            least, which, whom = at[lay.GATE], -1, -1
+            nearest, which, whom = at[lay.GATE], -1, -1
             for place in range(count):
                 if objects[place, lay.ROW] >= 0:
                     continue
                 for row in range(len(found)):
-                    if found[row, lay.FRAME] >= 0 or not found[row, lay.DETECTED_HELD] == 0:
+                    if found[row, lay.FRAME] >= 0 or found[row, lay.DETECTED_HELD] != 0:
                         continue
                     off = distance(objects[place], found[row], eye[2], at)
-                    if off < least:
-                        least, which, whom = off, place, row
+                    if off < nearest:
+                        nearest, which, whom = off, place, row
             if which < 0:
                 break
             objects[which, lay.ROW], found[whom, lay.FRAME] = whom, which
@@ -244,10 +250,10 @@ def followed(
                 item[lay.EVIDENCE] = min(item[lay.EVIDENCE] + look * at[lay.HIT], at[lay.MOST_EVIDENCE])
                 item[lay.NEWS] = 1
                 item[lay.SEEN_M] = carried[lay.WAY_M]
-            elif abs(item[lay.AZIMUTH]) < at[lay.VIEW_RAD] and at[lay.NEAR_M] < item[lay.RANGE] < at[lay.FAR_M]:
+            elif abs(item[lay.AZIMUTH]) < at[lay.LOOKS_RAD] and at[lay.NEAR_M] < item[lay.RANGE] < at[lay.FAR_M]:
                 item[lay.EVIDENCE] += look * at[lay.MISS]
         for row in range(len(found)):
-            taken = found[row, lay.FRAME] >= 0 or not found[row, lay.DETECTED_HELD] == 0
+            taken = found[row, lay.FRAME] >= 0 or found[row, lay.DETECTED_HELD] != 0
             if not taken and found[row, lay.DETECTED_M] > 0 and np.isfinite(found[row, lay.DETECTED_RAD]):
                 if count == lay.MOST:
                     continue
@@ -269,8 +275,7 @@ def followed(
     written = 0
     for place in range(count):
         item = objects[place]
-        least = at[lay.SHOWN] if item[lay.NEWS] == 1 else at[lay.HOLDS]
-        if not item[lay.EVIDENCE] >= least or hidden(objects, count, place, at):
+        if not item[lay.EVIDENCE] >= least(item, at) or behind_mirror(objects, count, place, at):
             continue
         if item[lay.NUMBER] < 0:
             item[lay.NUMBER] = carried[lay.NEXT]

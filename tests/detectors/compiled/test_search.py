@@ -23,6 +23,7 @@ SHIPPED = (
     "paper-subsample",
     "paper-as-printed",
     "paper-metal",
+    "paper-near",
     "background-mean",
     "background-svd",
     "cfar-os",

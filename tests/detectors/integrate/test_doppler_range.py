@@ -29,7 +29,7 @@ def test_a_point_is_found_at_its_range_and_cosine(azimuth_deg, array_radar, make
 
 
 def test_an_echo_below_the_noise_of_a_frame_is_found(array_radar, make_drive, make_stage, run_stage):
-    """Twelve decibels for 16 frames, three for the second channel."""
+    """Fifteen decibels for 32 frames, three for the second channel."""
     block = make_drive([(4.0, 0.0)], STEP_M * np.arange(150), noise=0.07)
     rows = _rows(make_stage, run_stage, array_radar, block, second=True)
     late = rows.take(rows.frame >= 50)
@@ -42,8 +42,8 @@ def test_noise_alone_passes_as_often_as_is_stated(second, array_radar, make_driv
     frames, rate = 1500, 1e-3
     block = make_drive([], STEP_M * np.arange(frames), seed=3)
     rows = _rows(make_stage, run_stage, array_radar, block, second=second, false_alarm_rate=rate)
-    # At most one maximum in each cell of 17 cosines and 40 taps above the threshold; neighbours share them.
-    assert 0.01 * rate < len(rows) / (frames * 17 * 40) < 1.2 * rate
+    # At most one maximum in each cell of 33 cosines and 40 taps above the threshold; neighbours share them.
+    assert 0.01 * rate < len(rows) / (frames * 33 * 40) < 1.2 * rate
 
 
 @pytest.mark.parametrize(("rate", "channels"), [(1e-7, 1), (1e-7, 2), (1e-3, 2), (0.5, 2)])

@@ -1,6 +1,7 @@
 """The whole chain in one pass, against its stages."""
 
 import dataclasses
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -35,9 +36,9 @@ def _whole(pipeline, radar, frames, cuts, *, fused):
             self.radar, self.truth, self.name, self.background = radar, None, "drive", None
 
     stream = pipeline.open(Header(), fused=fused)
-    assert any(isinstance(step.stage, Kernel) for step in stream._steps) == fused  # noqa: SLF001
+    assert any(isinstance(step.stage, Kernel) for step in stream._steps) == fused
     edges = [0, *cuts, len(frames)]
-    parts = [stream.step(frames.part(start, stop)) for start, stop in zip(edges, edges[1:], strict=False)]
+    parts = [stream.step(frames.part(start, stop)) for start, stop in pairwise(edges)]
     return Detections.join([*parts, stream.flush()])
 
 

@@ -264,7 +264,8 @@ class Crew:
 
     def _end(self, worker: _Worker) -> None:
         self._forget(worker)
-        self._nursery.kill(worker.pid)
+        if self._nursery.alive:  # else it has ended all its workers
+            self._nursery.kill(worker.pid)
 
     def _forget(self, worker: _Worker) -> None:
         self._selector.unregister(worker.channel)

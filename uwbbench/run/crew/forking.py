@@ -28,13 +28,21 @@ def _prepare() -> None:
 
 def _serve(channel: socket.socket) -> None:
     """Fork workers and wait for their ends, until the process that asks has ended."""
+    workers: set[int] = set()
+    with suppress(BrokenPipeError, ConnectionResetError):  # whoever asked does not wait for the answer any more
+        _answer(channel, workers)
+    for pid in workers:
+        with suppress(ProcessLookupError):
+            os.kill(pid, signal.SIGKILL)
+
+
+def _answer(channel: socket.socket, workers: set[int]) -> None:
     from uwbbench.run.crew.worker import work
 
-    workers: set[int] = set()
     while True:
         request, descriptors, _, _ = socket.recv_fds(channel, 1 + NUMBER.size, 1)
         if len(request) < 1 + NUMBER.size:
-            break
+            return
         if request[:1] == FORK:
             pid = os.fork()
             if pid == 0:
@@ -48,9 +56,6 @@ def _serve(channel: socket.socket) -> None:
             code = _code_of(pid, _PATIENCE_S if request[:1] == WAIT else 0.0)
             workers.discard(pid)
             channel.sendall(NUMBER.pack(code))
-    for pid in workers:
-        with suppress(ProcessLookupError):
-            os.kill(pid, signal.SIGKILL)
 
 
 def _code_of(pid: int, patience_s: float) -> int:

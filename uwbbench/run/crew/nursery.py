@@ -13,6 +13,7 @@ import struct
 import subprocess
 import sys
 import threading
+from collections.abc import Sequence
 
 from uwbbench.api.errors import UwbbenchError
 
@@ -52,9 +53,8 @@ class Nursery:
     def fork(self) -> tuple[int, socket.socket]:
         """Process number of a new worker, and the socket to it."""
         ours, theirs = socket.socketpair()
-        with theirs, self._lock:
-            socket.send_fds(self._channel, [FORK + bytes(NUMBER.size)], [theirs.fileno()])
-            return self._answer(), ours
+        with theirs:
+            return self._asked(FORK + bytes(NUMBER.size), [theirs.fileno()]), ours
 
     def wait(self, pid: int) -> int:
         """Exit code of a worker that has ended; the negative number of the signal that ended it, or :data:`LIVED`.
@@ -64,7 +64,7 @@ class Nursery:
         pid : int
             Its process number, which is free for others from then on.
         """
-        return self._asked(WAIT, pid)
+        return self._asked(WAIT + NUMBER.pack(pid))
 
     def kill(self, pid: int) -> None:
         """End a worker.
@@ -74,29 +74,30 @@ class Nursery:
         pid : int
             Its process number, which is free for others from then on.
         """
-        self._asked(KILL, pid)
+        self._asked(KILL + NUMBER.pack(pid))
 
-    def _asked(self, what: bytes, pid: int) -> int:
+    def _asked(self, request: bytes, descriptors: Sequence[int] = ()) -> int:
         with self._lock:
-            self._channel.sendall(what + NUMBER.pack(pid))
-            return self._answer()
+            try:
+                socket.send_fds(self._channel, [request], descriptors)
+                answer = self._channel.recv(NUMBER.size, socket.MSG_WAITALL)
+            except BaseException:  # the user's interrupt, between question and answer: the next would get this answer
+                self._channel.close()
+                raise
+        if len(answer) < NUMBER.size:
+            raise UwbbenchError("the process that starts workers has ended; run again, with --resume for what is left")
+        return int(NUMBER.unpack(answer)[0])
 
     @property
     def alive(self) -> bool:
         """Whether it can be asked, by this process."""
-        return self.owner == os.getpid() and self._process.poll() is None
+        return self.owner == os.getpid() and self._channel.fileno() >= 0 and self._process.poll() is None
 
     def close(self) -> None:
         """End it, and all workers with it."""
         if self.owner == os.getpid():
             self._channel.close()
             self._process.wait()
-
-    def _answer(self) -> int:
-        answer = self._channel.recv(NUMBER.size, socket.MSG_WAITALL)
-        if len(answer) < NUMBER.size:
-            raise UwbbenchError("the process that starts workers has ended; run again, with --resume for what is left")
-        return int(NUMBER.unpack(answer)[0])
 
 
 _kept: list[Nursery] = []
