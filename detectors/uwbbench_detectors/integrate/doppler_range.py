@@ -34,8 +34,7 @@ class DopplerRangeParams(MotionParams):
     )
     guard_taps: float = Field(1.0, ge=0, description="Rows begin so many taps behind the direct path.")
     second: bool = Field(
-        False,
-        description="Add the power of STS2, of the other antenna, and give rows its phase difference. Needs STS."
+        False, description="Add the power of STS2, of the other antenna, and give rows its phase difference. Needs STS."
     )
     step_m: float = Field(
         0.001, gt=0, description="Least way between two frames that are added. In between, the last rows stay, as held."
@@ -150,9 +149,7 @@ class DopplerRange(Stage[DopplerRangeParams]):
         place_m, yaw_rad = places_m(self, frames)
         valid = plain(frames.valid, np.bool_)
         state = self.bins, self.carried, self.noise, self.come, self.sums, self.at, self.rows
-        table = self._bank_frames(
-            first, second, self.params.second, valid, place_m, yaw_rad, frames.first, *state
-        )
+        table = self._bank_frames(first, second, self.params.second, valid, place_m, yaw_rad, frames.first, *state)
         width = 1 + len(self.names)
         made = Detections.of_table(self.names, table[:, :width], (frames.first, frames.valid), self.notes)
         return block.replace(detections=made)
