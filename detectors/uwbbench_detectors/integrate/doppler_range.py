@@ -136,7 +136,8 @@ class DopplerRange(Stage[DopplerRangeParams]):
         self.come: FloatArray = np.zeros(p.cosines)
         self.sums = np.zeros((p.cosines, 2 * channels, radar.taps), np.float32)
         self.rows: FloatArray = np.zeros((lay.MOST, lay.COLUMNS))
-        self.names = lay.NAMES if p.second else lay.NAMES[:-1]
+        self.rows[:, lay.PDOA_RAD] = np.nan  # and stays so with one channel
+        self.names = lay.NAMES
 
     def step(self, block: Block) -> Block:
         """Block with rows."""
@@ -150,8 +151,7 @@ class DopplerRange(Stage[DopplerRangeParams]):
         valid = plain(frames.valid, np.bool_)
         state = self.bins, self.carried, self.noise, self.come, self.sums, self.at, self.rows
         table = self._bank_frames(first, second, self.params.second, valid, place_m, yaw_rad, frames.first, *state)
-        width = 1 + len(self.names)
-        made = Detections.of_table(self.names, table[:, :width], (frames.first, frames.valid), self.notes)
+        made = Detections.of_table(self.names, table, (frames.first, frames.valid), self.notes)
         return block.replace(detections=made)
 
 

@@ -71,10 +71,10 @@ class FixedTrack(Stage[FixedTrackParams]):
     """
 
     consumes: ClassVar[frozenset[str]] = ports(
-        "frames", "detections", "range_m", "azimuth_rad", "amplitude", "score_db", "held"
+        "frames", "detections", "range_m", "azimuth_rad", "amplitude", "score_db"
     )
     produces: ClassVar[frozenset[str]] = ports(
-        "detections", "range_m", "azimuth_rad", "amplitude", "score_db", "held", "track"
+        "detections", "range_m", "azimuth_rad", "amplitude", "score_db", "held", "track", "probability_there"
     )
     removes: ClassVar[frozenset[str]] = ports("tap", "delay_s", "pdoa_rad", "motion_cosine", "motion_rad")
     fidelity = "baseline"
@@ -123,8 +123,9 @@ class FixedTrack(Stage[FixedTrackParams]):
         looked = frames.valid & np.asarray(frames.preamble.any(axis=1))
         looked[block.rows] = True
         found = np.zeros((len(rows), lay.GIVEN))
-        for place, name in enumerate(("range_m", "azimuth_rad", "amplitude", "score_db", "held"), 1):
+        for place, name in enumerate(("range_m", "azimuth_rad", "amplitude", "score_db"), 1):
             found[:, place] = rows[name]
+        found[:, lay.DETECTED_HELD] = rows["held"] if "held" in rows.names else 0.0
         starts = np.searchsorted(block.rows, np.arange(len(frames) + 1))
         table = self._follow(self.objects, self.carried, found, starts, looked, place_m, yaw_rad, frames.first, self.at)
         tracks = Detections.of_table(lay.NAMES, table, (frames.first, frames.valid), rows.notes)
