@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import ClassVar
 
 import numpy as np
@@ -50,7 +51,7 @@ class SidelobeFilter(Filter[SidelobeParams]):
         from uwbbench_detectors.filters import sidelobe_loops as loops
 
         p = self.params
-        self._unmasked = loops.unmasked
+        self._unmasked: Callable[..., BoolArray] = loops.unmasked
         width_s = 1.2 / radar.bandwidth_hz if p.width_ns is None else p.width_ns * 1e-9
         if p.matched and p.width_ns is None:
             width_s *= np.sqrt(2)
@@ -64,5 +65,4 @@ class SidelobeFilter(Filter[SidelobeParams]):
         rows = block.detections
         cosine, spread = rows["motion_cosine"], rows["motion_cosine_sd"]
         columns = [plain(values, np.float64) for values in (rows["tap"], rows["score_db"], cosine, spread)]
-        kept: BoolArray = self._unmasked(plain(rows.frame, np.int64), *columns, self.at)
-        return kept
+        return self._unmasked(plain(rows.frame, np.int64), *columns, self.at)

@@ -27,7 +27,7 @@ def side_lobe_db(off_taps: float, off_cosine: float, spread: float, at: FloatArr
     off = abs(off_taps)
     lobe = -3.0103 * (off / at[PULSE_TAPS]) ** 2
     skirt = at[LOBE_DB] - at[FALL_DB] * off
-    in_range = max(lobe, max(skirt, at[FAR_DB]))
+    in_range = float(max(lobe, max(skirt, at[FAR_DB])))
     if not spread > 0:
         return in_range
     ratio = off_cosine / spread

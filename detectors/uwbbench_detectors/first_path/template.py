@@ -73,7 +73,8 @@ class AlignTemplate(Stage[AlignTemplateParams]):
         if self._skips:
             self.note("align.template left out: delays of this radar count from transmission")
             return
-        from uwbbench_detectors.first_path import fractional, template_loops as loops
+        from uwbbench_detectors.first_path import fractional
+        from uwbbench_detectors.first_path import template_loops as loops
 
         stop = min(radar.noise_taps + p.crest_within_taps, radar.taps)
         if stop <= radar.noise_taps or p.to_tap > radar.taps - p.trail_taps - 2:

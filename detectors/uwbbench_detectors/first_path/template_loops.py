@@ -130,7 +130,7 @@ def stands_out(padded: Any, crest: int, at: FloatArray) -> bool:
     for tap in range(start, stop):
         power += padded[0, PAD + tap] ** 2 + padded[1, PAD + tap] ** 2
     height = padded[0, PAD + crest] ** 2 + padded[1, PAD + crest] ** 2
-    return height * (stop - start) >= power * at[POWER_RATIO]
+    return bool(height * (stop - start) >= power * at[POWER_RATIO])
 
 
 @compiled
@@ -172,15 +172,15 @@ def align_response(
     if not stands_out(padded, crest, at):
         return False
     settled = carried[COUNT] >= FIRST_LOOKS
-    tap = refined(padded, float(crest), 1 if settled else 3, table)
-    tap = max(min(tap, to_tap + REACH), to_tap - REACH)
+    at_tap = refined(padded, float(crest), 1 if settled else 3, table)
+    at_tap = max(min(at_tap, to_tap + REACH), to_tap - REACH)
     start, stop = max(aim - int(at[LEAD]), 1), min(aim + int(at[TRAIL]) + 1, taps - 1)
     if settled:
         for _ in range(2):
-            moved(padded, tap - to_tap, table, start, stop, made)
+            moved(padded, at_tap - to_tap, table, start, stop, made)
             shift, _, _ = fitted(made, template, start, stop)
-            tap -= max(-LARGEST_STEP, min(LARGEST_STEP, shift))
-    moved(padded, tap - to_tap, table, min(start, 0), taps, made)
+            at_tap -= max(-LARGEST_STEP, min(LARGEST_STEP, shift))
+    moved(padded, at_tap - to_tap, table, min(start, 0), taps, made)
     gain_r, gain_i = float(made[0, aim]), float(made[1, aim])
     if settled:
         gain_r = gain_i = size = 0.0

@@ -16,7 +16,7 @@ frame; sums of the squared and of the plain weights; the way behind the sums; ro
 FRAME, TAP, AMPLITUDE, SCORE_DB, COSINE, COSINE_SD, MOTION_RAD, HELD, PDOA_RAD = range(9)
 COLUMNS = 9
 NAMES = ("tap", "amplitude", "score_db", "motion_cosine", "motion_cosine_sd", "motion_rad", "held", "pdoa_rad")
-"""Columns of the rows behind their frame; the last only where there is a second channel."""
+"""Columns of the rows behind their frame; the last is NaN where there is one channel."""
 
 MOST = 64
 """Rows of a frame."""

@@ -151,7 +151,12 @@ def powers(sums: Any, per_noise: Any, power: Any) -> None:
 
 @inlined
 def vertex(before: float, here: float, after: float) -> float:
-    """Vertex of the parabola through the logarithms of three powers, in steps from the middle, at most one."""
+    """Vertex of the parabola through the logarithms of three powers, in steps from the middle, at most one.
+
+    Parameters
+    ----------
+    before, here, after : float
+    """
     before, here, after = math.log(before + 1e-30), math.log(here + 1e-30), math.log(after + 1e-30)
     bend = before - 2 * here + after
     return max(-1.0, min(1.0, 0.5 * (before - after) / bend)) if bend < 0 else 0.0

@@ -34,8 +34,7 @@ class DopplerRangeParams(MotionParams):
     )
     guard_taps: float = Field(1.0, ge=0, description="Rows begin so many taps behind the direct path.")
     second: bool = Field(
-        False,
-        description="Add the power of STS2, of the other antenna, and give rows its phase difference. Needs STS."
+        False, description="Add the power of STS2, of the other antenna, and give rows its phase difference. Needs STS."
     )
     step_m: float = Field(
         0.001, gt=0, description="Least way between two frames that are added. In between, the last rows stay, as held."
@@ -137,7 +136,8 @@ class DopplerRange(Stage[DopplerRangeParams]):
         self.come: FloatArray = np.zeros(p.cosines)
         self.sums = np.zeros((p.cosines, 2 * channels, radar.taps), np.float32)
         self.rows: FloatArray = np.zeros((lay.MOST, lay.COLUMNS))
-        self.names = lay.NAMES if p.second else lay.NAMES[:-1]
+        self.rows[:, lay.PDOA_RAD] = np.nan  # and stays so with one channel
+        self.names = lay.NAMES
 
     def step(self, block: Block) -> Block:
         """Block with rows."""
@@ -150,11 +150,8 @@ class DopplerRange(Stage[DopplerRangeParams]):
         place_m, yaw_rad = places_m(self, frames)
         valid = plain(frames.valid, np.bool_)
         state = self.bins, self.carried, self.noise, self.come, self.sums, self.at, self.rows
-        table = self._bank_frames(
-            first, second, self.params.second, valid, place_m, yaw_rad, frames.first, *state
-        )
-        width = 1 + len(self.names)
-        made = Detections.of_table(self.names, table[:, :width], (frames.first, frames.valid), self.notes)
+        table = self._bank_frames(first, second, self.params.second, valid, place_m, yaw_rad, frames.first, *state)
+        made = Detections.of_table(self.names, table, (frames.first, frames.valid), self.notes)
         return block.replace(detections=made)
 
 

@@ -44,7 +44,7 @@ def noise_power(made: Any, noise: FloatArray) -> float:
             noise[POWER] = power
         else:
             noise[POWER] += max(1 / noise[LOOKS], FORGETS) * (min(power, JUMP * noise[POWER]) - noise[POWER])
-    return noise[POWER]
+    return float(noise[POWER])
 
 
 @compiled

@@ -36,8 +36,8 @@ def mirror_range(delay_s: float, azimuth_rad: float, at: FloatArray) -> float:
     beyond = excess_m * (excess_m + 2 * at[BASELINE_M])
     root = math.sqrt(along_m * along_m + beyond)
     if along_m >= 0:
-        return (along_m + root) / 2 - at[BIAS_M]
-    return beyond / (root - along_m) / 2 - at[BIAS_M]
+        return float((along_m + root) / 2 - at[BIAS_M])
+    return float(beyond / (root - along_m) / 2 - at[BIAS_M])
 
 
 @compiled

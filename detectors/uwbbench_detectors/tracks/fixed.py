@@ -35,7 +35,9 @@ class FixedTrackParams(MotionParams):
         "may show it.",
     )
     plane_m: float = Field(
-        0.15, ge=0, description="What lies so near the plane of a mirror, or behind it, may be its image, or part of it."
+        0.15,
+        ge=0,
+        description="What lies so near the plane of a mirror, or behind it, may be its image, or part of it.",
     )
     view_deg: float = Field(47.0, gt=0, description="Azimuth up to which objects are rows.")
     looks_deg: float = Field(90.0, gt=0, description="Azimuth up to which an object should be found by a look.")
@@ -44,13 +46,35 @@ class FixedTrackParams(MotionParams):
 
 
 class FixedTrack(Stage[FixedTrackParams]):
-    """Objects that stand still in the world: believed after several looks, held where nothing can be measured."""
+    """Objects that stand still in the world: believed after several looks, held where nothing can be measured.
+
+    Each object has a place with a covariance, renewed by a Kalman filter from ranges and azimuths, and log odds that it
+    is there. A frame is ``way / look_m`` of a look, as echoes along a shorter way fade together: the odds of an object
+    that is found rise by that share of ``log(detected / by_chance)``, those of one in view that is not fall by it of
+    ``log((1 - detected) / (1 - by_chance))``. Detections go to the nearest object within the gate, in standard
+    deviations; others begin one. Objects nearer than ``apart_m`` are one. A robot that does not move has no looks:
+    nothing is learned and nothing forgotten, however long it stands, and however it turns.
+
+    One row for each believed object in view in each valid frame: the range of its detection, or, ``held`` 1, where the
+    object should be by odometry; its azimuth; amplitude and score of its last detection; ``track``, its number;
+    ``probability_there``. Rows that are held need more evidence (``holds``), since nothing renews it.
+
+    A mirror, such as a wall, stands across the line along which it is seen; whatever reflects less and lies behind that
+    plane is what the mirror shows, hides, or carries, such as corners and fittings. An object behind the plane of a
+    nearer one that is shown and reflects ``mirror_db`` more, by amplitude times range, is no row.
+
+    Frames must be relative to the direct path, as amplitudes are compared between frames.
+
+    References
+    ----------
+    Log odds of looks: Elfes, Computer 22(6):46, 1989.
+    """
 
     consumes: ClassVar[frozenset[str]] = ports(
-        "frames", "detections", "range_m", "azimuth_rad", "amplitude", "score_db", "held"
+        "frames", "detections", "range_m", "azimuth_rad", "amplitude", "score_db"
     )
     produces: ClassVar[frozenset[str]] = ports(
-        "detections", "range_m", "azimuth_rad", "amplitude", "score_db", "held", "track"
+        "detections", "range_m", "azimuth_rad", "amplitude", "score_db", "held", "track", "probability_there"
     )
     removes: ClassVar[frozenset[str]] = ports("tap", "delay_s", "pdoa_rad", "motion_cosine", "motion_rad")
     fidelity = "baseline"
@@ -99,11 +123,10 @@ class FixedTrack(Stage[FixedTrackParams]):
         looked = frames.valid & np.asarray(frames.preamble.any(axis=1))
         looked[block.rows] = True
         found = np.zeros((len(rows), lay.GIVEN))
-        for place, name in enumerate(("range_m", "azimuth_rad", "amplitude", "score_db", "held"), 1):
+        for place, name in enumerate(("range_m", "azimuth_rad", "amplitude", "score_db"), 1):
             found[:, place] = rows[name]
+        found[:, lay.DETECTED_HELD] = rows["held"] if "held" in rows.names else 0.0
         starts = np.searchsorted(block.rows, np.arange(len(frames) + 1))
-        table = self._follow(
-            self.objects, self.carried, found, starts, looked, place_m, yaw_rad, frames.first, self.at
-        )
+        table = self._follow(self.objects, self.carried, found, starts, looked, place_m, yaw_rad, frames.first, self.at)
         tracks = Detections.of_table(lay.NAMES, table, (frames.first, frames.valid), rows.notes)
         return block.replace(detections=tracks)

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from uwbbench.api import BoolArray, FloatArray, compiled, inlined
+from uwbbench.api import BoolArray, FloatArray, IntArray, compiled, inlined
 from uwbbench_detectors.position.wrap import wrapped
 from uwbbench_detectors.tracks import fixed_layout as lay
 
@@ -50,9 +50,8 @@ def distance(item: FloatArray, row: FloatArray, eye_rad: float, at: FloatArray) 
     across = sine * sine * item[lay.XX] - 2 * cosine * sine * item[lay.XY] + cosine * cosine * item[lay.YY]
     off_m = row[lay.DETECTED_M] - item[lay.RANGE]
     off_rad = wrapped(row[lay.DETECTED_RAD] - item[lay.AZIMUTH])
-    return off_m * off_m / (along + at[lay.RANGE_VARIANCE]) + off_rad * off_rad / (
-        across / (range_m * range_m) + at[lay.AZIMUTH_VARIANCE]
-    )
+    in_range = off_m * off_m / (along + at[lay.RANGE_VARIANCE])
+    return float(in_range + off_rad * off_rad / (across / (range_m * range_m) + at[lay.AZIMUTH_VARIANCE]))
 
 
 @inlined
@@ -149,7 +148,7 @@ def kept(objects: FloatArray, count: int, at: FloatArray) -> int:
 @inlined
 def least(item: FloatArray, at: FloatArray) -> float:
     """Log odds from which on an object is shown: more where it is not measured."""
-    return at[lay.SHOWN] if item[lay.NEWS] == 1 else at[lay.HOLDS]
+    return float(at[lay.SHOWN] if item[lay.NEWS] == 1 else at[lay.HOLDS])
 
 
 @inlined
@@ -297,7 +296,7 @@ def follow(
     objects: FloatArray,
     carried: FloatArray,
     found: FloatArray,
-    starts: FloatArray,
+    starts: IntArray,
     looked: BoolArray,
     place_m: FloatArray,
     yaw_rad: FloatArray,

@@ -23,9 +23,7 @@ def test_the_path_goes_by_way_of_the_transmitters_image(
     normal = np.array([np.cos(np.deg2rad(azimuth_deg)), np.sin(np.deg2rad(azimuth_deg))])
     at = np.asarray(transmitter_m[:2])
     path_m = np.linalg.norm(at + 2 * (range_m - at @ normal) * normal)
-    found = _ranges(
-        make_radar, make_block, make_stage, run_stage, [path_m], [np.deg2rad(azimuth_deg)], transmitter_m
-    )
+    found = _ranges(make_radar, make_block, make_stage, run_stage, [path_m], [np.deg2rad(azimuth_deg)], transmitter_m)
     assert found[0] == pytest.approx(range_m, abs=1e-9)
 
 
