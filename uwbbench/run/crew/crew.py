@@ -220,7 +220,8 @@ class Crew:
         worker = _Worker(self._count, role, pid, channel)
         self._workers[worker.number] = worker
         self._selector.register(channel, selectors.EVENT_READ, worker)
-        send(channel, pickle.dumps(Surroundings.here(self._memory_mb)))
+        with suppress(BrokenPipeError, ConnectionResetError):  # as of a task
+            send(channel, pickle.dumps(Surroundings.here(self._memory_mb)))
         return worker
 
     def _heard(self, worker: _Worker) -> Ending | None:

@@ -78,9 +78,12 @@ class Nursery:
 
     def _asked(self, request: bytes, descriptors: Sequence[int] = ()) -> int:
         with self._lock:
+            answer = b""
             try:
                 socket.send_fds(self._channel, [request], descriptors)
                 answer = self._channel.recv(NUMBER.size, socket.MSG_WAITALL)
+            except (BrokenPipeError, ConnectionResetError):
+                self._channel.close()
             except BaseException:  # the user's interrupt, between question and answer: the next would get this answer
                 self._channel.close()
                 raise
