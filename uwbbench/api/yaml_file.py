@@ -103,7 +103,7 @@ def read_yaml(path: Path) -> YamlFile:
         If it cannot be read or is not a mapping.
     """
     try:
-        if path.exists() and not path.is_file():
+        if path.exists() and not (path.is_file() or path.is_fifo()):  # a pipe of a shell is read like a file
             raise ConfigError(f"{path}: cannot be read: is no file")
         with path.open("rb") as file:
             content = file.read(MOST_BYTES + 1)
