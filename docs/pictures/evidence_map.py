@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
+from typing import Any, cast
 
 import numpy as np
 
@@ -16,8 +17,9 @@ from uwbbench.api import Capture
 from uwbbench.config.source import data_roots, open_dataset
 from uwbbench.detect.pipeline import load_detector
 from uwbbench.show.figures.style import caption, figure, save, styled
+from uwbbench_detectors.integrate.backprojection import Backprojection
 
-SHOWN = (
+SHOWN: tuple[tuple[str, str, dict[str, Any], tuple[float, float], tuple[float, float]], ...] = (
     ("rail: two corner reflectors", "pulson440-rail", {"frames": "moving"}, (0.0, 5.2), (-3.0, 6.0)),
     ("tree, 23 stops", "pulson440-tree", {}, (4.0, 12.0), (-5.0, 5.0)),
 )
@@ -38,15 +40,16 @@ def main(path: Path) -> None:
         save(drawn, path)
 
 
-def _draw(axes: object, capture: Capture) -> None:
+def _draw(axes: Any, capture: Capture) -> None:
     """One map, the objects found and the labelled ones, these at their slant distance from the way."""
     stream = load_detector("champion-map").open(capture)
     found = stream.step(capture.frames())
-    x_m, y_m, evidence = stream.stages[-1].evidence()
+    x_m, y_m, evidence = cast(Backprojection, stream.stages[-1]).evidence()
     axes.pcolormesh(x_m, y_m, 10 * np.log10(np.maximum(evidence, 10)), cmap="magma", rasterized=True)
     last = found.take(found.frame == found.frame.max())
     axes.plot(last["x_m"], last["y_m"], "+", color="white", markersize=5, label="found")
     place_m = capture.trajectory.position_m
+    assert capture.truth is not None  # noqa: S101 - both recordings are labelled
     for number, one in enumerate(capture.truth.objects):
         point = one.outline_m[0]
         depth_m = np.hypot(point[0] - place_m[:, 0], (point[2] if len(point) > 2 else 0.0) - place_m[:, 2]).mean()

@@ -88,7 +88,7 @@ def test_the_scatter_of_the_crest_is_measured():
     assert direct.crest_sd_s == pytest.approx(float(np.std(crests - off)) * INTERVAL_S, rel=0.25)
 
 
-@pytest.mark.parametrize("frame", [np.zeros(50), np.full(50, np.nan), np.full(50, 1.0 + 1j)])
+@pytest.mark.parametrize("frame", [np.zeros(50), np.full(50, np.nan), np.full(50, 1.0 + 1j), np.eye(50)[20]])
 def test_a_frame_without_a_direct_path_is_left_out(frame):
     assert DirectPath(radar_of()).aligned(frame.astype(complex)) is None
 

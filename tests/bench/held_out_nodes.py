@@ -2,9 +2,9 @@
 
     python tests/bench/held_out_nodes.py --data-dir DATA
 
-Each detector has a small grid of settings. For each node of et4173-walk the setting is taken that does best on the *other*
-node and on simulated walks (scenes ``walker`` and ``walker-p440``, seed 7001), the mean of both; what it finds on the
-node held out is the figure that may be reported. Beside it stands what the detector does as shipped.
+Each detector has a small grid of settings. For each node of et4173-walk the setting is taken that does best on the
+*other* node and on simulated walks (scenes ``walker`` and ``walker-p440``, seed 7001), the mean of both; what it finds
+on the node held out is the figure that may be reported. Beside it stands what the detector does as shipped.
 """
 
 from __future__ import annotations

@@ -39,3 +39,30 @@ def test_a_person_who_stops_becomes_background_and_is_found_again(walk):
     assert recall(found, range_m, 80, STOPS) > 0.9
     assert recall(found, range_m, STOPS + 96, GOES) < 0.5
     assert recall(found, range_m, GOES + 20, FRAMES) > 0.8
+
+
+def moving_body(range_m, seed=5):
+    """A capture of the radar of the walk, with an echo at a range in each frame; NaN where nobody is."""
+    tap, rng = np.arange(50), np.random.default_rng(seed)
+    place = 7 + np.nan_to_num(range_m, nan=1e6)[:, None] / 0.1499
+    echo = 0.05 * np.exp(-np.minimum((tap - place) ** 2 / 3, 700)) * np.exp(-2j * np.pi * place * 8)
+    noise = 3e-3 * (rng.normal(size=(len(range_m), 50)) + 1j * rng.normal(size=(len(range_m), 50)))
+    radar = Radar("test", 7987.2e6, 499.2e6, 1e-9, RATE_HZ, taps=50, noise_taps=4)
+    still = Trajectory(np.arange(len(range_m)) / RATE_HZ, np.zeros((len(range_m), 3)), np.zeros(len(range_m)))
+    samples = np.exp(-((tap - 7) ** 2) / 3) + echo + noise
+    return Capture(name="walk", radar=radar, trajectory=still, source="simulated", preamble=samples)
+
+
+@pytest.mark.slow
+def test_champion_still_finds_who_walks_and_holds_who_stops_for_two_seconds():
+    range_m = 1.5 + 0.5 * np.minimum(np.arange(FRAMES), STOPS) / RATE_HZ
+    found = load_detector("champion-still").run(moving_body(range_m))
+    assert recall(found, range_m, 60, STOPS) > 0.9
+    held = found.take(np.isnan(found["amplitude"]))
+    assert STOPS < found.frame.max() < STOPS + 4 * RATE_HZ
+    assert len(held.take(held.frame > STOPS)) > 1.5 * RATE_HZ
+
+
+@pytest.mark.slow
+def test_champion_still_says_nothing_where_nobody_walks():
+    assert len(load_detector("champion-still").run(moving_body(np.full(2000, np.nan)))) == 0

@@ -260,7 +260,7 @@ class DirectPath:
         unit: ComplexArray = np.asarray(samples.astype(complex) / top)
         magnitude = np.abs(unit)
         place = self._leading + int(magnitude[self._leading : self._leading + _SEARCHED].argmax())
-        if not magnitude[place] >= 10 * np.median(magnitude):
+        if not (magnitude[place] > 0 and magnitude[place] >= 10 * np.median(magnitude)):
             return None
         crest = crest_near(unit, place)
         moved = between(unit, np.arange(float(len(unit))) + (crest - self.crest))

@@ -30,6 +30,7 @@ from uwbbench.api.yaml_file import YamlFile
 from uwbbench.config.detector import DetectorConfig, check_detector
 from uwbbench.config.identity import from_results
 from uwbbench.config.source import CaptureRef, RunRef
+from uwbbench.detect.pipeline import Pipeline
 from uwbbench.measure.accuracy.rules import rules_on
 from uwbbench.measure.latency.machine import usable_cores
 from uwbbench.run.accuracy import AccuracyPass
@@ -123,7 +124,8 @@ def _job(folder: RunFolder, entry: Entry, roots: Sequence[Path], session: str) -
     unit = Unit("accuracy", _detector(experiment, entry.detector), entry.dataset, _reference(folder, entry, roots))
     if unit.id != entry.unit:
         raise UwbbenchError("its unit is not the one that the manifest describes")
-    return Job(unit, tuple(rules_on(rules_of(experiment), entry.dataset)), session)
+    rules = tuple(rules_on(rules_of(experiment), entry.dataset))
+    return Job(unit, rules, session, Pipeline(unit.detector).identity)
 
 
 def _detector(experiment: Mapping[str, Any], name: str) -> DetectorConfig:

@@ -36,8 +36,8 @@ class HardRooms(Dataset[HardRoomsParams]):
     Every room has walls, four to six objects of several materials, among them a weak one beside a strong one, whose
     faces reflect 20 to 30 dB apart; and a robot that drives five legs, turns on the spot between them, stands still
     twice for seconds, and slips. Objects speckle (``echo.scatterers``), bounce echoes to each other and hide each
-    other; corners shine. Channel, pulse with or without a tail, antennas, ringing, noise and array errors are the room's
-    own. Captures are named ``hard-rooms-SEED/NUMBER``.
+    other; corners shine. Channel, pulse with or without a tail, antennas, ringing, noise and array errors are the
+    room's own. Captures are named ``hard-rooms-SEED/NUMBER``.
     """
 
     card: ClassVar[Card] = Card(

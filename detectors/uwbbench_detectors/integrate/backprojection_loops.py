@@ -113,7 +113,7 @@ def in_units_of_noise(
 
 
 @inlined
-def path_m(x: float, y: float, look: FloatArray) -> float:
+def _path_m(x: float, y: float, look: FloatArray) -> float:
     """Path from the transmitter over a point to the receiver of a look."""
     to_x, to_y, from_x, from_y = x - look[TX_X], y - look[TX_Y], x - look[RX_X], y - look[RX_Y]
     path: float = math.sqrt(to_x * to_x + to_y * to_y) + math.sqrt(from_x * from_x + from_y * from_y)
@@ -121,7 +121,7 @@ def path_m(x: float, y: float, look: FloatArray) -> float:
 
 
 @inlined
-def seen_range_m(x: float, y: float, look: FloatArray, at: FloatArray) -> float:
+def _seen_range_m(x: float, y: float, look: FloatArray, at: FloatArray) -> float:
     """Range of a point from the receiver of a look; -1 where it is out of range or view."""
     dx, dy = x - look[RX_X], y - look[RX_Y]
     range_m = math.sqrt(dx * dx + dy * dy)
@@ -131,14 +131,14 @@ def seen_range_m(x: float, y: float, look: FloatArray, at: FloatArray) -> float:
 
 
 @inlined
-def sine_of(x: float, y: float, range_m: float, look: FloatArray) -> float:
+def _sine_of(x: float, y: float, range_m: float, look: FloatArray) -> float:
     """Sine of the azimuth of a point at a range, positive to the left."""
     sine: float = (look[AHEAD_X] * (y - look[RX_Y]) - look[AHEAD_Y] * (x - look[RX_X])) / range_m
     return sine
 
 
 @inlined
-def at_tap(samples: ComplexArray, tap: float) -> complex:
+def _at_tap(samples: ComplexArray, tap: float) -> complex:
     """Sample between taps, by the cubic through four of them."""
     k = int(tap)
     f = tap - k
@@ -194,10 +194,10 @@ def add_look(
         y = (owner[1, row] + 0.5) * at[CELL_M]
         for column in range(size):
             x = (owner[0, column] + 0.5) * at[CELL_M]
-            range_m = seen_range_m(x, y, look, at)
+            range_m = _seen_range_m(x, y, look, at)
             if range_m < 0:
                 continue
-            path = path_m(x, y, look)
+            path = _path_m(x, y, look)
             tap = look[ZERO] + path * at[TAPS_PER_M]
             if not 1 <= tap < taps - 2:
                 continue
@@ -210,10 +210,10 @@ def add_look(
                 cell[REAL] = cell[IMAGINARY] = cell[LOOKS] = 0.0
             if cell[LOOKS] == 0:
                 cell[BEGAN_M] = look[WAY_M]
-            z = at_tap(samples, tap)
+            z = _at_tap(samples, tap)
             if at[ARRAY_RAD] > 0:
-                late_rad = at[ARRAY_RAD] * (sine_of(x, y, range_m, look) - at[DIRECT_SINE])
-                z = (z + at_tap(second, tap) * complex(math.cos(late_rad), -math.sin(late_rad))) * ROOT_HALF
+                late_rad = at[ARRAY_RAD] * (_sine_of(x, y, range_m, look) - at[DIRECT_SINE])
+                z = (z + _at_tap(second, tap) * complex(math.cos(late_rad), -math.sin(late_rad))) * ROOT_HALF
             cosine, sine = math.cos(at[TURN_PER_M] * path), math.sin(at[TURN_PER_M] * path)
             cell[REAL] += z.real * cosine - z.imag * sine
             cell[IMAGINARY] += z.real * sine + z.imag * cosine
@@ -221,7 +221,7 @@ def add_look(
 
 
 @compiled
-def between(before: float, here: float, after: float) -> float:
+def _between(before: float, here: float, after: float) -> float:
     """Place of a crest between cells, by a parabola through logarithms, or through values that have none."""
     if before > 0 and after > 0:
         before, here, after = math.log(before), math.log(here), math.log(after)
@@ -272,9 +272,9 @@ def crests(cells: FloatArray, owner: IntArray, look: FloatArray, at: FloatArray,
             highest &= here >= value[up, column - 1] and here >= value[up, right]
             if not highest:
                 continue
-            x = owner[0, column] + 0.5 + between(value[row, column - 1], here, value[row, right])
-            y = owner[1, row] + 0.5 + between(value[row - 1, column], here, value[up, column])
-            if seen_range_m(x * at[CELL_M], y * at[CELL_M], look, at) >= 0:
+            x = owner[0, column] + 0.5 + _between(value[row, column - 1], here, value[row, right])
+            y = owner[1, row] + 0.5 + _between(value[row - 1, column], here, value[up, column])
+            if _seen_range_m(x * at[CELL_M], y * at[CELL_M], look, at) >= 0:
                 found[count, 0], found[count, 1], found[count, 2] = x * at[CELL_M], y * at[CELL_M], here
                 count += 1
     return found[:count].copy()
@@ -305,7 +305,7 @@ def explained(point: FloatArray, strong: FloatArray, looks: FloatArray, at: Floa
     shortest_m = longest_m = 0.0
     for index in range(len(looks) + 1):
         look = looks[min(index, len(looks) - 1)]
-        range_m = seen_range_m(point[0], point[1], look, at)
+        range_m = _seen_range_m(point[0], point[1], look, at)
         ends = index == len(looks)
         if range_m < 0 and not ends:
             continue
@@ -318,7 +318,7 @@ def explained(point: FloatArray, strong: FloatArray, looks: FloatArray, at: Floa
             height = count = 0.0
         if ends:
             break
-        off_m = path_m(point[0], point[1], look) - path_m(strong[0], strong[1], look)
+        off_m = _path_m(point[0], point[1], look) - _path_m(strong[0], strong[1], look)
         if count == 0:
             began_m, shortest_m, longest_m = look[WAY_M], off_m, off_m
         shortest_m, longest_m = min(shortest_m, off_m), max(longest_m, off_m)
@@ -326,7 +326,7 @@ def explained(point: FloatArray, strong: FloatArray, looks: FloatArray, at: Floa
         power = 1 / (1 + late * late)
         if at[ARRAY_RAD] > 0:
             other_m = math.hypot(strong[0] - look[RX_X], strong[1] - look[RX_Y])
-            sines = sine_of(point[0], point[1], range_m, look) - sine_of(strong[0], strong[1], other_m, look)
+            sines = _sine_of(point[0], point[1], range_m, look) - _sine_of(strong[0], strong[1], other_m, look)
             power *= math.cos(0.5 * at[ARRAY_RAD] * sines) ** 2
         height += power
         count += 1.0

@@ -116,7 +116,8 @@ class TrackBeforeDetect(Stage[TrackBeforeDetectParams]):
     References
     ----------
     Y. Barniv, "Dynamic programming solution for detecting dim moving targets", IEEE Trans. AES 21(1), 1985.
-    R. Nitzberg, "Clutter map CFAR analysis", IEEE Trans. AES 22(4), 1986 (level of each tap; here a mean of logarithms).
+    R. Nitzberg, "Clutter map CFAR analysis", IEEE Trans. AES 22(4), 1986 (level of each tap;
+    here a mean of logarithms).
     """
 
     consumes: ClassVar[frozenset[str]] = ports("frames", "noise", "first_path")

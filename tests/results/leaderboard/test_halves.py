@@ -60,7 +60,10 @@ def runs(tmp_path_factory: pytest.TempPathFactory):
         captures = [ref.open() for ref in dataset.references()]
         Learned.heart = {capture.frames(0, 1).preamble[0].tobytes(): capture for capture in captures}
         private = read_experiment(folder / "suite.yaml", seeds=folder / "seeds")
-        yield [run_experiment(one, folder / name, isolated=False).path for name, one in (("open", public), ("own", private))]
+        yield [
+            run_experiment(one, folder / name, isolated=False).path
+            for name, one in (("open", public), ("own", private))
+        ]
     finally:
         del registry._registered["stages", "learned"]
         registry.entries.cache_clear()
