@@ -66,4 +66,4 @@ class SidelobeFilter(Filter[SidelobeParams]):
         cosine, spread = rows["motion_cosine"], rows["motion_cosine_sd"]
         columns = [plain(values, np.float64) for values in (rows["tap"], rows["score_db"], cosine, spread)]
         known = np.isfinite(rows["tap"]) & np.isfinite(rows["score_db"])
-        return known & self._unmasked(plain(rows.frame, np.int64), *columns, self.at)
+        return np.asarray(known & self._unmasked(plain(rows.frame, np.int64), *columns, self.at))

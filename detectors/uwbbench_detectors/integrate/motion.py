@@ -59,7 +59,7 @@ def plain(values: Any, kind: type[np.generic]) -> Any:
 def single(samples: Any) -> Any:
     """Frames (frames, taps) in single precision, read-only, whatever the scale of those in double precision.
 
-    The latter are divided by a power of two each, which changes no digit: what follows is relative to the direct path.
+    The latter are divided by their largest part each, since what follows is relative to the direct path.
 
     Parameters
     ----------
@@ -69,5 +69,5 @@ def single(samples: Any) -> Any:
         return plain(samples, np.complex64)
     parts = np.ascontiguousarray(samples, np.complex128).view(np.float64)
     largest = np.max(np.abs(parts), axis=1, initial=0.0)
-    _, exponent = np.frexp(np.where(np.isfinite(largest), largest, 1.0))
-    return plain(np.ldexp(parts, -exponent[:, None]).view(np.complex128), np.complex64)
+    scale = np.where(np.isfinite(largest) & (largest > np.finfo(float).tiny), largest, 1.0)
+    return plain((parts / scale[:, None]).view(np.complex128), np.complex64)
