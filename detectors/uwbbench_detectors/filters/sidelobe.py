@@ -65,4 +65,5 @@ class SidelobeFilter(Filter[SidelobeParams]):
         rows = block.detections
         cosine, spread = rows["motion_cosine"], rows["motion_cosine_sd"]
         columns = [plain(values, np.float64) for values in (rows["tap"], rows["score_db"], cosine, spread)]
-        return self._unmasked(plain(rows.frame, np.int64), *columns, self.at)
+        known = np.isfinite(rows["tap"]) & np.isfinite(rows["score_db"])
+        return np.asarray(known & self._unmasked(plain(rows.frame, np.int64), *columns, self.at))

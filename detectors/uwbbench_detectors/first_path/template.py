@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import Field
 
 from uwbbench.api import Block, ConfigError, FloatArray, Radar, Stage, ports
-from uwbbench_detectors.integrate.motion import MotionParams, places_m, plain
+from uwbbench_detectors.integrate.motion import MotionParams, places_m, plain, single
 
 
 class AlignTemplateParams(MotionParams):
@@ -115,7 +115,7 @@ class AlignTemplate(Stage[AlignTemplateParams]):
             if samples is None:
                 continue
             clear = np.empty(len(frames), bool)
-            samples = plain(samples, np.complex64)
+            samples = single(samples)
             made = self._align(
                 samples, valid, place_m, self.templates[place], self.carried[place], self.at, self.table, clear
             )

@@ -54,3 +54,20 @@ def plain(values: Any, kind: type[np.generic]) -> Any:
         made = made.view()
         made.flags.writeable = False
     return made
+
+
+def single(samples: Any) -> Any:
+    """Frames (frames, taps) in single precision, read-only, whatever the scale of those in double precision.
+
+    The latter are divided by their largest part each, since what follows is relative to the direct path.
+
+    Parameters
+    ----------
+    samples : (frames, taps) complex array
+    """
+    if samples.dtype == np.complex64:
+        return plain(samples, np.complex64)
+    parts = np.ascontiguousarray(samples, np.complex128).view(np.float64)
+    largest = np.max(np.abs(parts), axis=1, initial=0.0)
+    scale = np.where(np.isfinite(largest) & (largest > np.finfo(float).tiny), largest, 1.0)
+    return plain((parts / scale[:, None]).view(np.complex128), np.complex64)

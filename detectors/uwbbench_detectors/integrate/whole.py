@@ -15,7 +15,7 @@ from uwbbench_detectors.first_path.template import AlignTemplate
 from uwbbench_detectors.integrate import bank_layout as lay
 from uwbbench_detectors.integrate.doppler_range import DopplerRange
 from uwbbench_detectors.integrate.fuse import FuseResponses
-from uwbbench_detectors.integrate.motion import places_m, plain
+from uwbbench_detectors.integrate.motion import places_m, plain, single
 from uwbbench_detectors.position.doppler_phase import DopplerPhase
 from uwbbench_detectors.position.mirror import MirrorRange
 from uwbbench_detectors.smooth.matched import MatchedFilter
@@ -143,9 +143,9 @@ class WholeChain(Kernel):
 
     def detect(self, frames: Frames, first_path: FloatArray | None) -> Detections:  # noqa: ARG002
         """Detections in consecutive frames."""
-        preamble = plain(frames.preamble, np.complex64)
-        sts1 = plain(frames.sts1, np.complex64) if self._sts1 else preamble
-        sts2 = plain(frames.sts2, np.complex64) if self._sts2 else preamble
+        preamble = single(frames.preamble)
+        sts1 = single(frames.sts1) if self._sts1 else preamble
+        sts2 = single(frames.sts2) if self._sts2 else preamble
         place_m, yaw_rad = places_m(self._bank, frames)
         table = self._whole_frames(
             preamble, sts1, sts2, plain(frames.valid, np.bool_), place_m, yaw_rad, frames.first, *self._state
