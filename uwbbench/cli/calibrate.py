@@ -58,9 +58,9 @@ def calibrate(
     settings: options.Settings = None,
     json: options.Json = False,
 ) -> None:
-    """Write a detector corrected for its own offsets, receiver by receiver.
+    """Write a detector corrected for its own offsets.
 
-    The offsets of range and azimuth are measured on a capture whose truth is known; that of range also on any drive, by
+    Receiver by receiver. The offsets of range and azimuth are measured on a capture whose truth is known; that of range also on any drive, by
     the pulse of echoes that move, or on an empty one, by a pulse that is known. Without a detector, print what the
     drive shows of the robot itself: direct path, noise, ringing, scatter of the crest, and the zero of delay.
     """
