@@ -60,9 +60,10 @@ def calibrate(
 ) -> None:
     """Write a detector corrected for its own offsets.
 
-    Receiver by receiver. The offsets of range and azimuth are measured on a capture whose truth is known; that of range also on any drive, by
-    the pulse of echoes that move, or on an empty one, by a pulse that is known. Without a detector, print what the
-    drive shows of the robot itself: direct path, noise, ringing, scatter of the crest, and the zero of delay.
+    Receiver by receiver. The offsets of range and azimuth are measured on a capture whose truth is known; that of range
+    also on any drive, by the pulse of echoes that move, or on an empty one, by a pulse that is known. Without a
+    detector, print what the drive shows of the robot itself: direct path, noise, ringing, scatter of the crest, and the
+    zero of delay.
     """
     import uwbbench
     from uwbbench.api.capture_file import list_receivers

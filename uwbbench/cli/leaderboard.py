@@ -88,10 +88,10 @@ def verify(
 ) -> None:
     """Check that run folders are consistent.
 
-    With --rerun also that detectors find what is stored. Consistent means: files have the hashes noted when the run ended, and identities, scores and counts follow from the
-    manifest and from the stored detections. That damage and edits are found does not say where detections come from:
-    who seals other detections is found by --rerun alone. Exits with 1 and a list if something does not hold, with 2
-    where a folder is no run folder.
+    With --rerun also that detectors find what is stored. Consistent means: files have the hashes noted when the run
+    ended, and identities, scores and counts follow from the manifest and from the stored detections. That damage and
+    edits are found does not say where detections come from: who seals other detections is found by --rerun alone. Exits
+    with 1 and a list if something does not hold, with 2 where a folder is no run folder.
     """
     from dataclasses import asdict
 
