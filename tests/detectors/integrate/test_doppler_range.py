@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.special import gammaincc
 
-from uwbbench_detectors.integrate.doppler_range import least_power
+from uwbbench_detectors.integrate.doppler_range import geometric_phase_rad, least_power
 
 STEP_M = 0.006
 
@@ -26,6 +26,17 @@ def test_a_point_is_found_at_its_range_and_cosine(azimuth_deg, array_radar, make
     assert last["pdoa_rad"][best] == pytest.approx(2.979 * np.sin(azimuth), abs=0.15)
     assert last["motion_rad"][best] == 0
     assert last["held"][best] == 0
+
+
+def test_phase_differences_count_from_the_direct_path_as_it_was_measured(
+    array_radar, make_drive, make_stage, run_stage
+):
+    block = make_drive([(3.0, 0.0)], STEP_M * np.arange(30))
+    usual, turned = (
+        _rows(make_stage, run_stage, array_radar, block, second=True, direct_phase_rad=phase) for phase in (None, 0.5)
+    )
+    expected = usual["pdoa_rad"] - geometric_phase_rad(array_radar) + 0.5
+    np.testing.assert_allclose(np.exp(1j * turned["pdoa_rad"]), np.exp(1j * expected), atol=1e-5)
 
 
 def test_an_echo_below_the_noise_of_a_frame_is_found(array_radar, make_drive, make_stage, run_stage):
