@@ -38,7 +38,7 @@ class DopplerRangeParams(MotionParams):
     )
     direct_phase_rad: float | None = Field(
         None,
-        description="Phase of STS2 against STS1 at the crest of the direct path, which aligned frames count theirs from: "
+        description="Phase of STS2 against STS1 at the crest of the direct path, from which aligned frames count: "
         "what the geometry of the antennas says if left out. Ringing that the antennas do not share turns it, by a "
         "radian and more on some robots, and every azimuth with it.",
     )
