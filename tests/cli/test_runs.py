@@ -133,7 +133,8 @@ def test_rescoring_with_an_impossible_gate_is_a_usage_error(uwbbench, experiment
 def test_progress_is_shown_on_a_terminal_and_stdout_stays_pure(experiment: Path, tmp_path: Path) -> None:
     terminal, theirs = pty.openpty()
     command = [sys.executable, "-m", "uwbbench.cli", "run", "small.yaml", "--jobs", "1", "--out", "first", "--json"]
-    with subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=theirs) as running:
+    printed = tmp_path / "printed.json"  # a pipe that nobody empties would hold the command up
+    with printed.open("wb") as out, subprocess.Popen(command, cwd=tmp_path, stdout=out, stderr=theirs) as running:
         os.close(theirs)
         shown = b""
         try:
@@ -141,11 +142,10 @@ def test_progress_is_shown_on_a_terminal_and_stdout_stays_pure(experiment: Path,
                 shown += part
         except OSError:  # Linux's way of saying that the other end is closed
             pass
-        printed = running.stdout.read()
     os.close(terminal)
     assert running.returncode == 0
     assert b"3/3" in shown
-    assert leaderboard(printed.decode())
+    assert leaderboard(printed.read_text())
 
 
 @pytest.mark.slow
