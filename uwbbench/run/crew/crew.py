@@ -13,6 +13,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any, Protocol, Self
 
+from uwbbench.api.errors import UwbbenchError
 from uwbbench.api.interruption import by_plugin
 from uwbbench.run.crew.messages import GAVE, LARGEST_BYTES, LENGTH, Refused, packed, send, unpacked
 from uwbbench.run.crew.nursery import LIVED, LOST, Nursery, nursery
@@ -266,7 +267,8 @@ class Crew:
     def _end(self, worker: _Worker) -> None:
         self._forget(worker)
         if self._nursery.alive:  # else it has ended all its workers
-            self._nursery.kill(worker.pid)
+            with suppress(UwbbenchError):  # or is ending just now
+                self._nursery.kill(worker.pid)
 
     def _forget(self, worker: _Worker) -> None:
         self._selector.unregister(worker.channel)

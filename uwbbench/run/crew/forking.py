@@ -75,6 +75,7 @@ def _code_of(pid: int, patience_s: float) -> int:
 def main() -> NoReturn:
     """Serve the socket whose number is given."""
     leave_to_parent()
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)  # that of a whole group is the parent's too, which ends all in order
     _prepare()
     with suppress(BrokenPipeError, ConnectionResetError):  # the run was interrupted, and listens no more
         _serve(socket.socket(fileno=int(sys.argv[1])))
