@@ -30,7 +30,7 @@ GRIDS: Mapping[str, list[Setting]] = {
         {
             "track.before_detect.speed_m_s": speed,
             "track.before_detect.acceleration_m_s2": acceleration,
-            "peaks.leading_edge.fraction": fraction,
+            "leading_edge.fraction": fraction,
         }
         for speed, acceleration, fraction in itertools.product((1.0, 2.0, 3.0), (0.25, 0.5, 1.0), (0.05, 0.1, 0.3))
     ],

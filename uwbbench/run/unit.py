@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import threading
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -15,7 +12,6 @@ from uwbbench.api.capture import Capture, CaptureHeader
 from uwbbench.api.detections import HANDED_OUT, Detections
 from uwbbench.api.drive import Drive
 from uwbbench.api.errors import PluginError
-from uwbbench.api.interruption import leave_to_parent
 from uwbbench.config.detector import DetectorConfig
 from uwbbench.config.identity import RESULTS_FILE
 from uwbbench.config.source import CaptureRef, RunRef
@@ -171,21 +167,6 @@ def _checked(session: str, detector: DetectorConfig) -> Pipeline | MappingPipeli
         known = Pipeline(detector) if detector.mapper is None else MappingPipeline(detector)
         _pipelines[session, detector.name] = known
     return known
-
-
-def die_with(parent: int) -> None:
-    """Make a worker leave the interrupt key to its parent, and end when the parent has ended, however it ended."""
-    if os.getpid() == parent or threading.current_thread() is not threading.main_thread():
-        return
-    leave_to_parent()
-
-    def watch() -> None:
-        while os.getppid() == parent:
-            time.sleep(1.0)
-        os._exit(1)
-
-    if not any(thread.name == "watch-parent" for thread in threading.enumerate()):
-        threading.Thread(target=watch, name="watch-parent", daemon=True).start()
 
 
 def found(job: Job, file: Path | None = None) -> Found:

@@ -21,6 +21,7 @@ from uwbbench.api import (
     ports,
     receiver_pose,
     rotate_z,
+    wrap_angle,
 )
 from uwbbench_detectors.integrate.motion import MotionParams, places_m
 
@@ -336,7 +337,7 @@ class Backprojection(Stage[BackprojectionParams]):
             poses[of, 0].astype(np.int64),
             processed=processed,
             range_m=range_m,
-            azimuth_rad=np.asarray((azimuth_rad + np.pi) % (2 * np.pi) - np.pi),
+            azimuth_rad=wrap_angle(azimuth_rad),
             amplitude=np.sqrt(evidence),
             score_db=10 * np.log10(evidence),
             x_m=place_m[:, 0] + origin_m[0],

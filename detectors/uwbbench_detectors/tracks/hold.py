@@ -27,14 +27,14 @@ class HoldParams(Params):
 class Hold(Stage[HoldParams]):
     """The last detections repeated in frames that have none, until they are too old.
 
-    A held row is the last one of its body with all its columns, but for ``amplitude``, which is NaN: nothing was
-    measured there. It ends after ``hold_s``, where a detection lies within ``depth_m`` and what the body may have gone
+    A held row is the last one of its body with all its columns, and ``held`` 1, as nothing was measured of it in that
+    frame. It ends after ``hold_s``, where a detection lies within ``depth_m`` and what the body may have gone
     meanwhile, or where a frame has as many detections as ``targets``. A body that stands is kept so, and one that has
     gone is a ghost for as long. No row is held in frames that are invalid or of zeros. For a radar that stands.
     """
 
-    consumes: ClassVar[frozenset[str]] = ports("frames", "detections", "range_m", "amplitude")
-    produces: ClassVar[frozenset[str]] = ports("detections", "range_m", "amplitude")
+    consumes: ClassVar[frozenset[str]] = ports("frames", "detections", "range_m")
+    produces: ClassVar[frozenset[str]] = ports("detections", "held")
 
     def open(self, radar: Radar) -> None:
         """Start without rows."""
@@ -44,8 +44,9 @@ class Hold(Stage[HoldParams]):
     def step(self, block: Block) -> Block:
         """Block with the rows that are held."""
         found, frames = block.detections, block.frames
+        found = found.with_columns(held=np.zeros(len(found)))
         if not len(found) and not self._held:
-            return block
+            return block.replace(detections=found)
         columns = found.columns
         order = np.argsort(found.frame, kind="stable")
         stop = np.searchsorted(found.frame[order], frames.index, side="right")
@@ -73,4 +74,4 @@ class Hold(Stage[HoldParams]):
         ][: max(p.targets - len(now), 0)]
         seen = [(time_s, new["range_m"], new) for new in now if np.isfinite(new["range_m"])]
         self._held = [*seen, *alive]
-        return [{**row, "frame": frame, "amplitude": np.nan} for _, _, row in alive]
+        return [{**row, "frame": frame, "held": 1.0} for _, _, row in alive]

@@ -13,7 +13,7 @@ def front(make_radar, make_block, make_stage, run_stage):
         samples = np.sqrt(np.atleast_2d(energy)).astype(complex)
         found = Detections([0], tap=[float(tap)])
         block = make_block(samples, noise_rms=np.full(1, noise), first_path=np.full(1, first_path), detections=found)
-        stage = make_stage("peaks.leading_edge", **params)
+        stage = make_stage("leading_edge", **params)
         return run_stage(stage, make_radar(samples.shape[1]), block).detections["tap"][0]
 
     return run

@@ -14,9 +14,7 @@ def hold(make_block, run_cut, make_radar):
         samples = np.ones((frames, 4), complex)
         samples[list(silent)] = 0
         table = np.array(rows, float).reshape(-1, 2)
-        found = Detections(
-            table[:, 0].astype(int), processed=np.arange(frames), range_m=table[:, 1], amplitude=np.ones(len(table))
-        )
+        found = Detections(table[:, 0].astype(int), processed=np.arange(frames), range_m=table[:, 1])
         block = make_block(samples, detections=found)
         return run_cut("track.hold", params, make_radar(4), block, list(range(1, frames))).detections
 
@@ -27,7 +25,7 @@ def test_the_last_row_is_repeated_until_it_is_too_old(hold):
     found = hold(20, [(2, 1.0), (3, 1.1)], hold_s=5 / RATE_HZ)
     assert found.frame.tolist() == [2, 3, 4, 5, 6, 7, 8]
     assert found.range_m.tolist() == [1.0] + 6 * [1.1]
-    assert np.isnan(found["amplitude"]).tolist() == 2 * [False] + 5 * [True]
+    assert found["held"].tolist() == 2 * [0.0] + 5 * [1.0]
 
 
 def test_frames_of_zeros_hold_nothing(hold):

@@ -1,7 +1,7 @@
 """Captures that were made, not read, handed to other processes as a file that they map.
 
-Simulating a capture takes longer than most detectors take on it, so that it is done once for all of them. The file is
-written and read by processes of one run, and ends with it.
+A capture is simulated once for all detectors, whose processes would else each do so. The file is written and read by
+processes of one run, and ends with it.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """What processes of a run send each other: length and content over a socket.
 
-A worker has run plugins, so that nothing that it sends may make its reader do anything: :func:`unpacked` makes arrays,
-numbers, texts and the data classes of uwbbench, and calls no function.
+A worker has run plugins, so that nothing that it sends may make its reader do more than take it in: :func:`unpacked`
+makes arrays, numbers, texts and the data classes of uwbbench, and calls what makes these alone.
 """
 
 from __future__ import annotations

@@ -31,12 +31,16 @@ class Nursery:
     Raises
     ------
     UwbbenchError
-        If it does not start.
+        Where the operating system cannot fork.
     """
 
     def __init__(self) -> None:
         from uwbbench.measure.latency.launch import ONE_THREAD
 
+        if not hasattr(os, "fork"):
+            raise UwbbenchError(
+                "processes of their own for detectors take a system that forks; use --no-isolation here"
+            )
         self.owner = os.getpid()
         self._channel, theirs = socket.socketpair()
         with theirs:

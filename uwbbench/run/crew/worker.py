@@ -6,6 +6,8 @@ import os
 import pickle
 import socket
 import sys
+import threading
+import time
 import traceback
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -16,6 +18,7 @@ import cloudpickle
 
 from uwbbench.api import registry
 from uwbbench.api.errors import PluginError
+from uwbbench.api.interruption import leave_to_parent
 from uwbbench.run.crew.messages import GAVE, RAISED, packed, receive, send
 from uwbbench.run.crew.nursery import LOST
 
@@ -120,10 +123,16 @@ def work(descriptor: int) -> NoReturn:
         os._exit(code)
 
 
-def _carry_out(channel: socket.socket) -> None:
-    from uwbbench.run.unit import die_with
+def _end_with(parent: int) -> None:
+    """End this process, whatever it is at, when the one that it was forked from has ended, however that ended."""
+    while os.getppid() == parent:
+        time.sleep(1.0)
+    os._exit(1)
 
-    die_with(os.getppid())
+
+def _carry_out(channel: socket.socket) -> None:
+    leave_to_parent()
+    threading.Thread(target=_end_with, args=(os.getppid(),), daemon=True).start()
     first = receive(channel)
     if first is None:
         return

@@ -22,7 +22,14 @@ from uwbbench.api import (
 )
 from uwbbench_datasets.simulator.shapes import Face, faces
 from uwbbench_datasets.simulator.terms.echo import reflected
-from uwbbench_datasets.simulator.terms.scatterers import Scatterers, extended, outline_points, own_stream
+from uwbbench_datasets.simulator.terms.scatterers import (
+    Scatterers,
+    extended,
+    in_phase,
+    joined,
+    outline_points,
+    own_stream,
+)
 from uwbbench_datasets.simulator.terms.walls import mirrored, reflection_point, walls
 
 _SAME_M = 1e-9
@@ -67,15 +74,11 @@ class ObjectBounce(Term[ObjectBounceParams]):
 
     def bound(self, view: View) -> float:
         """All bounces of a frame in phase."""
-        return float(np.sum([np.max(np.sum(np.abs(one.amplitude), axis=1)) for one in self._each(view)]))
+        return in_phase(self._each(view))
 
     def paths(self, view: View, rng: np.random.Generator) -> Paths | None:
         """One path for each ordered pair of points of two objects."""
-        parts = list(self._each(view))
-        if not parts:
-            return None
-        names = ("delay_s", "amplitude", "azimuth_rad")
-        return Paths(*(np.concatenate([getattr(one, name) for one in parts], axis=1) for name in names))
+        return joined(self._each(view))
 
     def _each(self, view: View) -> Iterator[Paths]:
         """Paths of each ordered pair of objects."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -52,6 +52,20 @@ class Scatterers:
 def extended(view: View) -> Iterator[tuple[int, SceneObject]]:
     """Objects that have an outline and are no walls, with their column among the objects."""
     return ((column, body) for column, body in enumerate(view.objects) if body.shape not in ("wall", "point"))
+
+
+def in_phase(parts: Iterable[Paths]) -> float:
+    """Largest amplitude of a frame if all of its paths were in phase."""
+    return float(np.sum([np.max(np.sum(np.abs(one.amplitude), axis=1)) for one in parts]))
+
+
+def joined(parts: Iterable[Paths]) -> Paths | None:
+    """All paths side by side; None where there are none."""
+    each = list(parts)
+    if not each:
+        return None
+    names = ("delay_s", "amplitude", "azimuth_rad")
+    return Paths(*(np.concatenate([getattr(one, name) for one in each], axis=1) for name in names))
 
 
 def outline_points(
@@ -139,15 +153,11 @@ class ScattererEcho(Term[ScattererParams]):
 
     def bound(self, view: View) -> float:
         """All scatterers of a frame in phase."""
-        return float(np.sum([np.max(np.sum(np.abs(one.amplitude), axis=1)) for one in self._each(view)]))
+        return in_phase(self._each(view))
 
     def paths(self, view: View, rng: np.random.Generator) -> Paths | None:
         """One path for each scatterer."""
-        parts = list(self._each(view))
-        if not parts:
-            return None
-        names = ("delay_s", "amplitude", "azimuth_rad")
-        return Paths(*(np.concatenate([getattr(one, name) for one in parts], axis=1) for name in names))
+        return joined(self._each(view))
 
     def _each(self, view: View) -> Iterator[Paths]:
         scale = view.radar.wavelength_m / (4 * np.pi) ** 1.5

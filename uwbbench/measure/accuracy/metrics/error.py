@@ -81,18 +81,22 @@ class MeanAbsoluteError(_ErrorMetric):
         return float(np.abs(partial).sum()), float(len(partial))
 
 
-class MatchedMeanAbsoluteError(MeanAbsoluteError):
+class _OfMatches(_ErrorMetric):
+    """Of true positives alone."""
+
+    @staticmethod
+    def partial(outcome: Outcome) -> FloatArray:
+        """Signed errors (n,) of the matched detections."""
+        return _ErrorMetric.partial(matched_only(outcome))
+
+
+class MatchedMeanAbsoluteError(_OfMatches, MeanAbsoluteError):
     """Mean of the absolute errors of true positives alone: read it with the recall, or a detector wins by missing."""
 
     title: ClassVar[str] = "MAE of matches"
     order: ClassVar[int] = 200
     brief: ClassVar[bool] = False
     headline: ClassVar[int | None] = None
-
-    @staticmethod
-    def partial(outcome: Outcome) -> FloatArray:
-        """Signed errors (n,) of the matched detections."""
-        return _ErrorMetric.partial(matched_only(outcome))
 
 
 class _Percentile(_ErrorMetric):
@@ -198,18 +202,13 @@ class Bias(_ErrorMetric):
         return float(partial.sum()), float(len(partial))
 
 
-class MatchedBias(Bias):
+class MatchedBias(_OfMatches, Bias):
     """Mean of the signed errors of true positives alone: what a wrong zero of delay leaves, free of false ones."""
 
     title: ClassVar[str] = "bias of matches"
     order: ClassVar[int] = 201
     beside: ClassVar[str] = "matched_mae"
     brief: ClassVar[bool] = False
-
-    @staticmethod
-    def partial(outcome: Outcome) -> FloatArray:
-        """Signed errors (n,) of the matched detections."""
-        return _ErrorMetric.partial(matched_only(outcome))
 
 
 class Scatter(_ErrorMetric):
@@ -235,15 +234,10 @@ class Scatter(_ErrorMetric):
         return float(np.std(partial)) if len(partial) else math.nan
 
 
-class MatchedScatter(Scatter):
+class MatchedScatter(_OfMatches, Scatter):
     """Spread of the signed errors of true positives alone, around their bias."""
 
     title: ClassVar[str] = "scatter of matches"
     order: ClassVar[int] = 202
     beside: ClassVar[str] = "matched_mae"
     brief: ClassVar[bool] = False
-
-    @staticmethod
-    def partial(outcome: Outcome) -> FloatArray:
-        """Signed errors (n,) of the matched detections."""
-        return _ErrorMetric.partial(matched_only(outcome))
