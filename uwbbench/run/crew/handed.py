@@ -21,7 +21,7 @@ _ALIGNED = 64
 
 
 def hand_over(opened: Capture | Drive, file: Path) -> bool:
-    """Write a capture, or a run, whose samples lie in memory; others can be opened again as fast.
+    """Write a capture, or a run, whose samples lie in memory; others are opened again.
 
     Parameters
     ----------
