@@ -58,7 +58,7 @@ def test_champion_still_finds_who_walks_and_holds_who_stops_for_two_seconds():
     range_m = 1.5 + 0.5 * np.minimum(np.arange(FRAMES), STOPS) / RATE_HZ
     found = load_detector("champion-still").run(moving_body(range_m))
     assert recall(found, range_m, 60, STOPS) > 0.9
-    held = found.take(np.isnan(found["amplitude"]))
+    held = found.take(found["held"] > 0)
     assert STOPS < found.frame.max() < STOPS + 4 * RATE_HZ
     assert len(held.take(held.frame > STOPS)) > 1.5 * RATE_HZ
 

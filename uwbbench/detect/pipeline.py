@@ -69,12 +69,16 @@ class Pipeline:
     def _check_ports(self) -> None:
         available = {"frames"}
         makers: dict[str, str] = {}
+        given: dict[str, set[str]] = {}
         for step in self.config.steps:
             for port in registry.load_plugin("stages", step.use).produces:
                 makers.setdefault(port, step.label)
         for step in self.config.steps:
             stage = registry.load_plugin("stages", step.use)
-            for port in sorted(stage.consumes - available):
+            given[step.label] = available
+            # What a step takes away is there for the one that takes its place.
+            there = available | given[step.unless] if step.unless else available
+            for port in sorted(stage.consumes - there):
                 if port in makers:
                     hint = f"step '{makers[port]}' makes it, but stands later, or its result is gone by then"
                 else:

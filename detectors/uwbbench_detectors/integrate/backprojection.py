@@ -16,6 +16,7 @@ from uwbbench.api import (
     Detections,
     FloatArray,
     IntArray,
+    Params,
     Radar,
     Stage,
     ports,
@@ -69,11 +70,7 @@ class BackprojectionParams(MotionParams):
         gt=0,
         description="An object is one face within this angle: evidence is forgotten over the way that turns it so far.",
     )
-    second: bool = Field(
-        True,
-        description="Add STS2, of the other antenna, in phase for the azimuth of each cell, where fuse.responses has "
-        "brought it along.",
-    )
+    second: bool = Field(False, description="Add STS2, of the other antenna, in phase with the first. Needs STS.")
     false_alarm_rate: float = Field(
         1e-6, gt=0, lt=1, description="Probability that noise alone makes a cell of the map as high as the threshold."
     )
@@ -147,6 +144,11 @@ class Backprojection(Stage[BackprojectionParams]):
         """Whether an answer hangs on frames behind it."""
         return self.params.smoothed
 
+    @classmethod
+    def needs_with(cls, params: Params) -> frozenset[str]:
+        """STS where the second antenna is asked for."""
+        return ports("sts") if isinstance(params, BackprojectionParams) and params.second else ports()
+
     def open(self, radar: Radar) -> None:
         """Start with an empty map.
 
@@ -213,8 +215,6 @@ class Backprojection(Stage[BackprojectionParams]):
         frames = block.frames
         self._last = block.cut(len(frames), len(frames))
         second = frames.sts2 if self.params.second else None
-        if second is None:
-            self._at[self._loops.ARRAY_RAD] = 0.0
         looks, boresight_rad, usable = self._looks_of(block)
         known = []
         for row in np.flatnonzero(usable):
